@@ -159,3 +159,18 @@ def deliver(func: str, name: str, result: np.ndarray, dst: np.ndarray | None) ->
         raise fail(func, name, "writable", "a read-only array")
     dst[...] = result
     return dst
+
+
+def strength32f(func: str, name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
+    """An image of finite strengths >= 0 as C-contiguous float32."""
+    value = image32f(func, name, value, shape)
+    if not (value.min() >= 0 and value.max() < np.inf):  # NaN fails either comparison
+        raise fail(func, name, "finite and >= 0 everywhere", f"values from {value.min():g} to {value.max():g}")
+    return value
+
+
+def threshold(func: str, name: str, value: Any) -> float:
+    """A number >= 0; infinity, which no strength reaches, switches the test off."""
+    if isinstance(value, (float, np.floating)) and value == np.inf:
+        return np.inf
+    return number(func, name, value, 0)

@@ -1,0 +1,308 @@
+"""From edge strengths to an edge map: grey-level pictures of strength, thresholds and what refines them."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from . import _args
+
+_CHAIN_ALPHA = 6.0  # Venkatesh and Rosin: how many deviations above the population an edge must stand
+_CHAIN_POPULATION = 10  # fewer chains than this have no statistics to speak of
+_MAD_TO_MEAN_DEVIATION = 1.4826 * np.sqrt(2 / np.pi)  # of a normal population
+
+
+def strengthImage(strength: np.ndarray, cut: float, dst: np.ndarray | None = None) -> np.ndarray:
+    """Map edge strengths to grey levels, saturating at a cut value.
+
+    strengthImage(strength, cut[, dst]) -> dst
+
+    dst = min(255, ceil(255 * strength / cut)): 0 only where there is no edge, 255 from `cut` on.
+
+    Parameters
+    ----------
+    strength : ndarray of shape (H, W), CV_32F or any real type
+        Edge strength, finite and >= 0; 0 where there is no edge. Jump in units of length or crease in degrees.
+    cut : float
+        Strength that maps to 255, > 0. The paper uses 64 degrees for crease edges.
+    dst : ndarray of shape (H, W), CV_8U, optional
+        Receives the result where shape and type fit.
+
+    Returns
+    -------
+    dst : ndarray of shape (H, W), CV_8U
+
+    Raises
+    ------
+    rangeedge.error
+        If `strength` is not a real (H, W) image or holds a negative or non-finite value, or if `cut` is not
+        a finite number > 0.
+
+    Notes
+    -----
+    Jiang and Bunke, section 6. Level 80 of a crease image is 20 degrees, level 120 is 30 degrees.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> strengthImage(np.float32([[0, 0.1, 20, 30, 64, 90]]), 64)
+    array([[  0,   1,  80, 120, 255, 255]], dtype=uint8)
+    """
+    strength = _args.strength32f("strengthImage", "strength", strength)
+    cut = _args.number("strengthImage", "cut", cut, 0, above=True)
+    return _args.deliver("strengthImage", "dst", _grey_levels(strength, cut), dst)
+
+
+def overallStrength(
+    jump: np.ndarray, crease: np.ndarray, jumpCut: float, creaseCut: float = 64.0, dst: np.ndarray | None = None
+) -> np.ndarray:
+    """Merge jump and crease strengths into one grey-level image.
+
+    overallStrength(jump, crease, jumpCut[, creaseCut[, dst]]) -> dst
+
+    dst = max(strengthImage(jump, jumpCut), strengthImage(crease, creaseCut)), so both kinds of edge share
+    one scale: what :func:`salienceDistanceTransform` takes as salience.
+
+    Parameters
+    ----------
+    jump, crease : ndarray of shape (H, W), CV_32F or any real type
+        Edge strengths, finite and >= 0; 0 where there is no edge.
+    jumpCut, creaseCut : float
+        Strengths that map to 255, > 0: a length, and an angle in degrees.
+    dst : ndarray of shape (H, W), CV_8U, optional
+        Receives the result where shape and type fit.
+
+    Returns
+    -------
+    dst : ndarray of shape (H, W), CV_8U
+
+    Raises
+    ------
+    rangeedge.error
+        If an image is not a real (H, W) image of finite values >= 0, if their shapes differ, or if a cut is
+        not a finite number > 0.
+
+    Notes
+    -----
+    Jiang and Bunke, section 6.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> overallStrength(np.float32([[0, 0.5, 2]]), np.float32([[0, 64, 32]]), jumpCut=1)
+    array([[  0, 255, 255]], dtype=uint8)
+    """
+    func = "overallStrength"
+    jump = _args.strength32f(func, "jump", jump)
+    crease = _args.strength32f(func, "crease", crease, jump.shape)
+    jumpCut = _args.number(func, "jumpCut", jumpCut, 0, above=True)
+    creaseCut = _args.number(func, "creaseCut", creaseCut, 0, above=True)
+    merged = cv2.max(_grey_levels(jump, jumpCut), _grey_levels(crease, creaseCut))
+    return _args.deliver(func, "dst", merged, dst)
+
+
+def selectEdges(
+    jump: np.ndarray,
+    crease: np.ndarray,
+    jumpThreshold: float,
+    creaseThreshold: float = 30.0,
+    *,
+    hysteresis: float = 1.0,
+    minLength: int = 1,
+    dynamic: bool = False,
+    dst: np.ndarray | None = None,
+) -> np.ndarray:
+    """Select edge pixels by strength, by connection to strong ones, by length and by chain statistics.
+
+    selectEdges(jump, crease, jumpThreshold[, creaseThreshold[, hysteresis[, minLength[, dynamic[, dst]]]]]) -> dst
+
+    The steps run in this order, each on what the one before has left:
+
+    1. *Thresholds*: a pixel is an edge where jump >= jumpThreshold or crease >= creaseThreshold, and that
+       strength is positive.
+    2. *Hysteresis*, for `hysteresis` < 1: pixels above `hysteresis` times a threshold are added where their
+       8-connected component holds a pixel above the full one.
+    3. *Length*, for `minLength` > 1: 8-connected components shorter than that are removed.
+    4. *Dynamic threshold*, if `dynamic`: chains that do not stand out of the population of all candidate
+       chains are removed, as below.
+
+    Parameters
+    ----------
+    jump : ndarray of shape (H, W), CV_32F or any real type
+        Jump strength, a length; finite and >= 0, 0 where there is no edge.
+    crease : ndarray of shape (H, W), CV_32F or any real type
+        Crease strength in degrees; finite and >= 0, 0 where there is no edge.
+    jumpThreshold : float
+        Least jump, in the unit of `jump`. With 0 every jump counts; ``numpy.inf`` switches jump edges off.
+    creaseThreshold : float
+        Least crease in degrees; 0 and ``numpy.inf`` as above.
+    hysteresis : float
+        Low thresholds as a fraction of the high ones, in (0, 1]; 1 is no hysteresis.
+    minLength : int
+        Least length of an 8-connected component in pixels, >= 1. The length is the longer side of the
+        bounding box: the number of pixels of a straight line, however thick.
+    dynamic : bool
+        Whether to apply the dynamic threshold. It needs a map whose candidates are mostly noise, so pass
+        strengths found with ``minSignificance=0`` and low thresholds.
+    dst : ndarray of shape (H, W), CV_8U, optional
+        Receives the result where shape and type fit.
+
+    Returns
+    -------
+    dst : ndarray of shape (H, W), CV_8U
+        255 on edges, 0 elsewhere.
+
+    Raises
+    ------
+    rangeedge.error
+        If an image is not a real (H, W) image of finite values >= 0, if their shapes differ, or if a
+        parameter is out of its range.
+
+    Notes
+    -----
+    Thresholds after Jiang and Bunke, section 6: 20 degrees for quiet scanners, 30 for noisy ones.
+
+    The dynamic threshold is that of Venkatesh and Rosin (1995), for either type of edge by itself: the
+    candidates (positive strength) are thinned and cut at junctions into chains of length L and mean
+    strength m. With the centre M and the deviation D of the population, a chain is kept where
+
+        m >= (M(m) + 6 D(m)) - 3 D(m) L / (M(L) + 6 D(L)),
+
+    so the longer a chain, the fainter it may be. M and D are the median and the median absolute deviation,
+    scaled to the mean absolute deviation of a normal population, in place of the means of the original:
+    true edges then do not raise the threshold as long as most chains are noise. Every pixel goes with the
+    nearest chain. With fewer than ten chains there is no population and nothing is removed.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> jump, crease = np.zeros((2, 1, 6), np.float32)
+    >>> jump[0] = 2, 4, 2, 0, 2, 0
+    >>> selectEdges(jump, crease, 3)
+    array([[  0, 255,   0,   0,   0,   0]], dtype=uint8)
+    >>> selectEdges(jump, crease, 3, hysteresis=0.5)
+    array([[255, 255, 255,   0,   0,   0]], dtype=uint8)
+    """
+    func = "selectEdges"
+    jump = _args.strength32f(func, "jump", jump)
+    crease = _args.strength32f(func, "crease", crease, jump.shape)
+    thresholds = (
+        _args.threshold(func, "jumpThreshold", jumpThreshold),
+        _args.threshold(func, "creaseThreshold", creaseThreshold),
+    )
+    hysteresis = _args.number(func, "hysteresis", hysteresis, 0, 1, above=True)
+    minLength = _args.integer(func, "minLength", minLength, 1)
+    dynamic = _args.boolean(func, "dynamic", dynamic)
+
+    edges = _reaching(jump, crease, thresholds)
+    if hysteresis < 1:
+        low = (hysteresis * thresholds[0], hysteresis * thresholds[1])
+        edges = _connected_to(edges, _reaching(jump, crease, low))
+    if minLength > 1:
+        edges = _long_components(edges, minLength)
+    if dynamic:
+        edges &= _outstanding(jump) | _outstanding(crease)
+    return _args.deliver(func, "dst", edges.view(np.uint8) * np.uint8(255), dst)
+
+
+def _grey_levels(strength: np.ndarray, cut: float) -> np.ndarray:
+    """P§6, at the edge pixels only; in double precision, so that a strength of exactly one level stays there."""
+    levels = np.zeros(strength.shape, np.uint8)
+    edge = strength > 0
+    levels[edge] = np.minimum(np.ceil(255 * strength[edge].astype(np.float64) / cut), 255)
+    return levels
+
+
+def _reaching(jump: np.ndarray, crease: np.ndarray, thresholds: tuple[float, float]) -> np.ndarray:
+    """Where a positive strength reaches its threshold, as bool."""
+    return _at_least(jump, thresholds[0]) | _at_least(crease, thresholds[1])
+
+
+def _at_least(strength: np.ndarray, threshold: float) -> np.ndarray:
+    if threshold > np.finfo(np.float32).max:
+        return np.zeros(strength.shape, bool)
+    threshold = np.float32(threshold)
+    return strength >= threshold if threshold > 0 else strength > 0
+
+
+def _connected_to(strong: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+    """The 8-connected components of `candidates` that hold a pixel of `strong`, a subset of them."""
+    count, labels = cv2.connectedComponents(candidates.view(np.uint8))
+    keep = np.zeros(count, bool)
+    keep[labels[strong]] = True
+    return _pixels_of(candidates, labels, keep)
+
+
+def _long_components(edges: np.ndarray, minLength: int) -> np.ndarray:
+    """The 8-connected components whose bounding box has a side of at least `minLength`."""
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(edges.view(np.uint8))
+    extent = stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
+    return _pixels_of(edges, labels, extent >= minLength)
+
+
+def _pixels_of(edges: np.ndarray, labels: np.ndarray, keep: np.ndarray) -> np.ndarray:
+    """The pixels of `edges` whose label is one to keep; only edge pixels are looked up."""
+    kept = np.zeros_like(edges)
+    kept[edges] = keep[labels[edges]]
+    return kept
+
+
+def _outstanding(strength: np.ndarray) -> np.ndarray:
+    """Where the nearest chain of candidates passes the threshold of Venkatesh and Rosin (L§6)."""
+    candidates = strength > 0
+    if not candidates.any():
+        return candidates
+    chains = _chains(candidates)
+    _, nearest = cv2.distanceTransformWithLabels(
+        (~chains).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
+    )
+    owner = nearest[chains] - 1
+    length = np.bincount(owner)
+    mean = np.bincount(owner, weights=strength[chains]) / length
+    keep = _stands_out(length, mean)
+    outstanding = np.zeros_like(candidates)
+    outstanding[candidates] = keep[nearest[candidates] - 1]
+    return outstanding
+
+
+def _chains(edges: np.ndarray) -> np.ndarray:
+    """The skeleton of a map, cut at its junctions; what is nothing but junction stays whole."""
+    from skimage.morphology import skeletonize
+
+    skeleton = skeletonize(edges)
+    junctions = _branches(skeleton) > 2
+    # A branch of a junction touches its neighbours diagonally: one pixel more has to go.
+    cut = skeleton & ~cv2.dilate(junctions.view(np.uint8), np.ones((3, 3), np.uint8)).view(bool)
+    count, labels = cv2.connectedComponents(skeleton.view(np.uint8))
+    survives = np.zeros(count, bool)
+    survives[labels[cut]] = True
+    return cut | _pixels_of(skeleton, labels, ~survives)
+
+
+def _branches(skeleton: np.ndarray) -> np.ndarray:
+    """How many branches leave every skeleton pixel: changes from off to on around it."""
+    ring = [(-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1)]
+    row, col = np.nonzero(skeleton)
+    padded = np.pad(skeleton, 1)
+    around = np.stack([padded[row + 1 + dy, col + 1 + dx] for dy, dx in ring])
+    branches = np.zeros(skeleton.shape, np.uint8)
+    branches[row, col] = (around & ~np.roll(around, 1, axis=0)).sum(axis=0)
+    return branches
+
+
+def _stands_out(length: np.ndarray, mean: np.ndarray) -> np.ndarray:
+    """Which chains lie above the line of Venkatesh and Rosin through (0, high) and (long, high - drop)."""
+    if len(length) < _CHAIN_POPULATION:
+        return np.ones(len(length), bool)
+    centre, deviation = _population(mean)
+    centre_length, deviation_length = _population(length)
+    high = centre + _CHAIN_ALPHA * deviation
+    drop = 0.5 * _CHAIN_ALPHA * deviation
+    long = centre_length + _CHAIN_ALPHA * deviation_length
+    return mean >= high - drop * length / long
+
+
+def _population(values: np.ndarray) -> tuple[float, float]:
+    """Robust centre and mean absolute deviation."""
+    centre = np.median(values)
+    return centre, _MAD_TO_MEAN_DEVIATION * np.median(np.abs(values - centre))
