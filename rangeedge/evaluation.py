@@ -239,8 +239,8 @@ def evaluateEdges(
     if ignore is not None:
         not_judged |= _args.image8(func, "ignore", ignore, shape) != 0
     labels = None if kind is None else _classes_of(_args.image8(func, "kind", kind, shape))
-    creases = _strength_error(func, "crease", crease, creaseTruth, shape)
-    jumps = _strength_error(func, "jump", jump, jumpTruth, shape)
+    creases = _strengths(func, "crease", crease, creaseTruth, shape)
+    jumps = _strengths(func, "jump", jump, jumpTruth, shape)
 
     is_edge = np.isin(truth, (TRUTH_JUMP, TRUTH_CONVEX, TRUTH_CONCAVE))
     judged = _distance(not_judged) > tolerance
@@ -527,7 +527,7 @@ def _classes_of(kind: np.ndarray) -> dict[int, np.ndarray]:
     }
 
 
-def _strength_error(
+def _strengths(
     func: str, name: str, strength: Any, truth: Any, shape: tuple[int, int]
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Detected and true strengths, or None where neither is given."""
