@@ -4,3 +4,5 @@ from ._args import error
 
 __version__ = "0.1.0"
 __all__ = ["error"]
+from ._constants import *  # noqa
+from .edges import *  # noqa

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
+#include <nanobind/stl/optional.h>
+
+#include <array>
+#include <optional>
+
+#include "edges.hpp"
+#include "scanline.hpp"
+
+namespace nb = nanobind;
+using namespace nb::literals;
+using namespace rangeedge;
+
+namespace {
+
+template <class T>
+using In = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
+template <class T>
+using Out = nb::ndarray<T, nb::c_contig, nb::device::cpu>;
+
+// Hands a vector to NumPy without a copy; `row` elements a row.
+template <class T, class E>
+nb::ndarray<nb::numpy, T> handed_over(std::vector<E>&& values) {
+    auto* owner = new std::vector<E>(std::move(values));
+    nb::capsule capsule(owner, [](void* p) noexcept { delete static_cast<std::vector<E>*>(p); });
+    return nb::ndarray<nb::numpy, T>(owner->data(), {owner->size(), sizeof(E) / sizeof(T)}, capsule);
+}
+
+template <class T>
+nb::ndarray<nb::numpy, int> split_scan_line(In<T> y, std::optional<In<T>> x, double eps) {
+    std::vector<Segment> pending, segments;
+    {
+        nb::gil_scoped_release release;
+        const T* abscissa = x ? x->data() : nullptr;
+        for_each_run(y.data(), abscissa, static_cast<int>(y.size()), [&](int first, int last) {
+            split_run(Run<T>{y.data(), abscissa, nullptr, first, last}, static_cast<T>(eps), pending, segments);
+        });
+    }
+    return handed_over<int>(std::move(segments));
+}
+
+template <class T>
+RangeImage<T> range_image(const In<T>& src, bool projective, const std::array<double, 6>& to_plane,
+                          const std::array<double, 3>& axis) {
+    const bool points = src.ndim() == 3;
+    RangeImage<T> image{};
+    image.rows = static_cast<int>(src.shape(0));
+    image.cols = static_cast<int>(src.shape(1));
+    image.ordinate = points ? nullptr : src.data();
+    image.points = points ? src.data() : nullptr;
+    image.projective = projective;
+    std::copy(to_plane.begin(), to_plane.end(), image.to_plane);
+    std::copy(axis.begin(), axis.end(), image.axis);
+    return image;
+}
+
+using NoiseArgs = std::array<double, 3>;
+
+Noise noise_model(const NoiseArgs& abc, const std::optional<In<float>>& map) {
+    return {abc[0], abc[1], abc[2], map ? map->data() : nullptr};
+}
+
+template <class T>
+void define(nb::module_& m) {
+    m.def("split_scan_line", &split_scan_line<T>, "y"_a.noconvert(), "x"_a.noconvert().none(), "eps"_a);
+    m.def(
+        "edge_candidates",
+        [](In<T> src, bool projective, std::array<double, 6> to_plane, std::array<double, 3> axis, NoiseArgs noise,
+           std::optional<In<float>> noise_map, const Parameters& parameters) {
+            std::vector<Candidate> candidates;
+            {
+                nb::gil_scoped_release release;
+                candidates = detect(range_image(src, projective, to_plane, axis), noise_model(noise, noise_map), parameters);
+            }
+            return handed_over<std::uint8_t>(std::move(candidates));
+        },
+        "src"_a.noconvert(), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a, "noise_map"_a.noconvert().none(), "parameters"_a);
+    m.def(
+        "edge_strength",
+        [](In<T> src, bool projective, std::array<double, 6> to_plane, std::array<double, 3> axis, NoiseArgs noise,
+           std::optional<In<float>> noise_map, const Parameters& parameters, Out<float> jump, Out<float> crease,
+           Out<std::uint8_t> kind, Out<float> significance) {
+            nb::gil_scoped_release release;
+            const auto candidates = detect(range_image(src, projective, to_plane, axis), noise_model(noise, noise_map), parameters);
+            combine_maximum(candidates, static_cast<std::int64_t>(jump.size()), jump.data(), crease.data(), kind.data(),
+                            significance.data());
+        },
+        "src"_a.noconvert(), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a, "noise_map"_a.noconvert().none(), "parameters"_a,
+        "jump"_a.noconvert(), "crease"_a.noconvert(), "kind"_a.noconvert(), "significance"_a.noconvert());
+}
+
+}  // namespace
+
+void bind_edges(nb::module_& m) {
+    nb::class_<Parameters>(m, "Parameters")
+        .def(
+            "__init__",
+            [](Parameters* self, double eps, double eps_factor, int directions, bool interpolate, bool endpoint,
+               double max_shift, int max_gap, double min_significance, int threads) {
+                new (self) Parameters{eps, eps_factor, directions, interpolate, endpoint, max_shift, max_gap, min_significance, threads};
+            },
+            nb::kw_only(), "eps"_a, "eps_factor"_a, "directions"_a, "interpolate"_a, "endpoint"_a, "max_shift"_a, "max_gap"_a,
+            "min_significance"_a, "threads"_a);
+    define<float>(m);
+    define<double>(m);
+}

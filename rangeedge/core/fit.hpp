@@ -1,0 +1,73 @@
+// The curve of a segment (paper, end of section 4.2): a least-squares line or quadratic with its covariance.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cmath>
+
+namespace rangeedge {
+
+// Power sums of samples (x, y), x counted from `origin` and y from `base`.
+struct Moments {
+    double origin = 0, base = 0;
+    double n = 0, x1 = 0, x2 = 0, x3 = 0, x4 = 0;
+    double y0 = 0, y1 = 0, y2 = 0, yy = 0;
+
+    void add(double x, double y, double sign = 1) {
+        const double t = x - origin, t2 = t * t, h = y - base, v = sign * h;
+        n += sign;
+        x1 += sign * t, x2 += sign * t2, x3 += sign * t * t2, x4 += sign * t2 * t2;
+        y0 += v, y1 += v * t, y2 += v * t2, yy += v * h;
+    }
+    // The same sums, counted from another origin.
+    Moments moved(double to) const {
+        const double d = origin - to, d2 = d * d;
+        Moments m = *this;
+        m.origin = to;
+        m.x1 = x1 + d * n;
+        m.x2 = x2 + 2 * d * x1 + d2 * n;
+        m.x3 = x3 + 3 * d * x2 + 3 * d2 * x1 + d * d2 * n;
+        m.x4 = x4 + 4 * d * x3 + 6 * d2 * x2 + 4 * d * d2 * x1 + d2 * d2 * n;
+        m.y1 = y1 + d * y0;
+        m.y2 = y2 + 2 * d * y1 + d2 * y0;
+        return m;
+    }
+    // Joins the samples of another segment, counted from the same base.
+    Moments& operator+=(const Moments& other) {
+        const Moments o = other.moved(origin);
+        n += o.n, x1 += o.x1, x2 += o.x2, x3 += o.x3, x4 += o.x4;
+        y0 += o.y0, y1 += o.y1, y2 += o.y2, yy += o.yy;
+        return *this;
+    }
+};
+
+// f(x) = c0 + c1 p1 + c2 p2 in the polynomials p1 = x - mean and p2 = p1^2 - alpha p1 - beta, which are orthogonal
+// over the samples. A line has c2 = 0 and norm2 = 0; a single sample has c1 = 0 and norm1 = 0 as well.
+struct Curve {
+    double base = 0, mean = 0, alpha = 0, beta = 0;
+    double c0 = 0, c1 = 0, c2 = 0;
+    double n = 0, norm1 = 0, norm2 = 0;  // squared norms of 1, p1, p2 where they are used
+    double sum_squares = 0;              // of the residuals
+
+    double value(double x) const {
+        const double p1 = x - mean;
+        return base + c0 + p1 * c1 + ((p1 - alpha) * p1 - beta) * c2;
+    }
+    double slope(double x) const { return c1 + (2 * (x - mean) - alpha) * c2; }
+    // Variances for samples of unit variance; a slope that the samples do not fix has none: infinite.
+    double value_variance(double x) const {
+        const double p1 = x - mean, p2 = (p1 - alpha) * p1 - beta;
+        return 1 / n + (norm1 > 0 ? p1 * p1 / norm1 : 0) + (norm2 > 0 ? p2 * p2 / norm2 : 0);
+    }
+    double slope_variance(double x) const {
+        const double d = 2 * (x - mean) - alpha;
+        return norm1 > 0 ? 1 / norm1 + (norm2 > 0 ? d * d / norm2 : 0) : HUGE_VAL;
+    }
+};
+
+// Least squares. The quadratic term is kept only where it exceeds `significance` of its own standard deviations,
+// with samples of standard deviation `sigma`.
+Curve fit_least_squares(const Moments& moments, double sigma, double significance);
+
+// The quadratic, or line, or constant through the given samples (one to three of them).
+Curve fit_interpolating(const Moments& moments);
+
+}  // namespace rangeedge

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "line.hpp"
+
+#include <algorithm>
+
+namespace rangeedge {
+namespace {
+
+enum Direction { rows_bit = 1, cols_bit = 2, diag45_bit = 4 };
+
+template <class T>
+constexpr T nan = std::numeric_limits<T>::quiet_NaN();
+
+struct Vector {
+    double x, y, z;
+};
+double dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+Vector cross(const Vector& a, const Vector& b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+Vector combination(const Vector& a, double k, const Vector& b) { return {a.x + k * b.x, a.y + k * b.y, a.z + k * b.z}; }
+bool normalise(Vector& a) {
+    const double length = std::sqrt(dot(a, a));
+    if (!(length > 0) || !std::isfinite(length)) return false;
+    a = {a.x / length, a.y / length, a.z / length};
+    return true;
+}
+
+}  // namespace
+
+int line_count(int direction, int rows, int cols) {
+    return direction == rows_bit ? rows : direction == cols_bit ? cols : rows + cols - 1;
+}
+
+Path line_path(int direction, int i, int rows, int cols) {
+    if (direction == rows_bit) return {0, i, 1, 0, cols};
+    if (direction == cols_bit) return {i, 0, 0, 1, rows};
+    // Diagonals run to the right, from the left border or from the lower (45) or upper (135) one.
+    const int col = std::max(0, i - rows + 1);
+    if (direction == diag45_bit) {
+        const int row = std::min(i, rows - 1);
+        return {col, row, 1, -1, std::min(row + 1, cols - col)};
+    }
+    const int row = std::max(0, rows - 1 - i);
+    return {col, row, 1, 1, std::min(rows - row, cols - col)};
+}
+
+template <class T>
+bool LineReader<T>::constant_tolerance() const {
+    if (parameters_.eps > 0) return !image_.projective;
+    if (noise_.map) return false;
+    return image_.projective ? noise_.a <= 0 && noise_.b <= 0 : noise_.b <= 0 && noise_.c <= 0;
+}
+
+template <class T>
+double LineReader<T>::tolerance(double ordinate, std::int64_t pixel) const {
+    if (parameters_.eps > 0) return image_.projective ? parameters_.eps * ordinate * ordinate : parameters_.eps;
+    return parameters_.eps_factor * sigma(ordinate, pixel);
+}
+
+template <class T>
+void LineReader<T>::read(const Path& path, Line<T>& line) const {
+    const auto n = static_cast<std::size_t>(path.size);
+    line.path = path;
+    line.projective = image_.projective;
+    line.irregular = image_.points != nullptr;
+    line.y.resize(n);
+    line.start = 0, line.step = 1, line.kappa = 1;
+    if (line.irregular) {
+        read_points(line);
+    } else {
+        const std::int64_t stride = static_cast<std::int64_t>(path.drow) * image_.cols + path.dcol;
+        const T* source = image_.ordinate + path.pixel(0, image_.cols);
+        for (std::size_t k = 0; k < n; ++k) line.y[k] = source[static_cast<std::int64_t>(k) * stride];
+        // The line's direction e and the place of its first pixel, in the plane of the image.
+        const double* p = image_.to_plane;
+        const double du = p[0] * path.dcol + p[1] * path.drow, dv = p[3] * path.dcol + p[4] * path.drow;
+        const double u = p[0] * path.col + p[1] * path.row + p[2], v = p[3] * path.col + p[4] * path.row + p[5];
+        line.step = std::hypot(du, dv);
+        line.start = (u * du + v * dv) / line.step;
+        const double offset = (u * dv - v * du) / line.step;
+        line.kappa = std::sqrt(1 + offset * offset);
+    }
+    line.scaled = !constant_tolerance();
+    line.tolerance = line.scaled ? 1 : tolerance(1, 0);
+    if (!line.scaled) return;
+    line.scale.resize(n);
+    for (std::size_t k = 0; k < n; ++k)
+        line.scale[k] = static_cast<T>(
+            1 / std::max(tolerance(line.ordinate(static_cast<int>(k)), path.pixel(static_cast<int>(k), image_.cols)), 1e-30));
+}
+
+// The plane of a line of points holds its first and last point and the viewpoint (projective) or the viewing axis.
+template <class T>
+void LineReader<T>::read_points(Line<T>& line) const {
+    const Path& path = line.path;
+    const auto point = [&](int k) {
+        const T* p = image_.points + 3 * path.pixel(k, image_.cols);
+        return Vector{static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
+    };
+    const auto valid = [](const Vector& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); };
+    line.x.resize(line.y.size());
+    std::fill(line.y.begin(), line.y.end(), nan<T>);
+    std::fill(line.x.begin(), line.x.end(), nan<T>);
+    int first = 0, last = path.size - 1;
+    while (first < path.size && !valid(point(first))) ++first;
+    while (last > first && !valid(point(last))) --last;
+    if (first >= last) return;
+
+    const Vector axis{image_.axis[0], image_.axis[1], image_.axis[2]};
+    const Vector a = point(first), b = point(last);
+    Vector normal = image_.projective ? cross(a, b) : cross(axis, combination(b, -1, a));
+    if (!normalise(normal)) return;
+    Vector away = combination(axis, -dot(axis, normal), normal);  // the axis within the plane
+    line.kappa = std::sqrt(dot(away, away));
+    if (!normalise(away)) return;
+    // Across the viewing direction, the way the samples run.
+    Vector along = cross(normal, away);
+    const double turn = image_.projective ? dot(b, along) * dot(a, away) - dot(a, along) * dot(b, away)
+                                          : dot(combination(b, -1, a), along);
+    if (turn < 0) along = {-along.x, -along.y, -along.z};
+    const double inverse_kappa = line.kappa > 0 ? 1 / line.kappa : 1;
+    for (int k = first; k <= last; ++k) {
+        const Vector p = point(k);
+        if (!valid(p)) continue;
+        const auto i = static_cast<std::size_t>(k);
+        const double r = dot(p, away);
+        if (!image_.projective) {
+            line.x[i] = static_cast<T>(dot(p, along));
+            line.y[i] = static_cast<T>(-r);
+        } else if (r > 0) {
+            // r = kappa' z along the axis: the plane's inverse depth is counted along the axis, as with a camera.
+            const double z = r * line.kappa;
+            line.x[i] = static_cast<T>(dot(p, along) / z);
+            line.y[i] = static_cast<T>(1 / z);
+        }
+    }
+    line.kappa = inverse_kappa;
+}
+
+template class LineReader<float>;
+template class LineReader<double>;
+
+}  // namespace rangeedge

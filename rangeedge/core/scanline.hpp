@@ -1,0 +1,43 @@
+// Scan line approximation (paper, section 4.1): one scan line, a curve in a plane, is split into segments.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <vector>
+
+namespace rangeedge {
+
+// A curve segment: its first and last sample.
+struct Segment {
+    int first, last;
+    int size() const { return last - first + 1; }
+};
+
+// One run of valid samples. `x` is null where samples are one unit apart, else strictly increasing.
+// `scale` is null where one tolerance holds for the whole run, else it multiplies each residual.
+template <class T>
+struct Run {
+    const T* y;
+    const T* x;
+    const T* scale;
+    int first, last;
+};
+
+// Splits a run into segments whose residuals against the quadratic through both end points and the midpoint
+// stay within `eps`; appends them to `segments` in order. `pending` is scratch, left empty.
+template <class T>
+void split_run(const Run<T>& run, T eps, std::vector<Segment>& pending, std::vector<Segment>& segments);
+
+// Calls visit(first, last) for every maximal stretch of valid samples, cut where the abscissa does not increase.
+template <class T, class Visit>
+void for_each_run(const T* y, const T* x, int n, Visit&& visit) {
+    for (int k = 0; k < n;) {
+        if (!(y[k] == y[k])) {  // NaN marks a sample without data
+            ++k;
+            continue;
+        }
+        const int first = k++;
+        while (k < n && y[k] == y[k] && (!x || x[k] > x[k - 1])) ++k;
+        visit(first, k - 1);
+    }
+}
+
+}  // namespace rangeedge

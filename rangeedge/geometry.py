@@ -1,0 +1,194 @@
+"""From a range image in any of its forms to the coordinates in which scan lines are plane curves (P§4.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import cv2
+import numpy as np
+
+from ._args import array, boolean, described, fail, image8, number
+
+SRC = "a depth image of shape (H, W), or points of shape (H, W, 3) or (H, W, 4)"
+
+
+@dataclass(frozen=True)
+class RangeFrame:
+    """A range image as the kernels take it: invalid pixels are NaN, ordinates grow toward the viewer.
+
+    `samples` holds inverse depth (`projective`) or height of shape (H, W), or points of shape (H, W, 3).
+    `to_plane` takes (column, row, 1) to normalised image coordinates or to lengths; `axis` is the viewing direction.
+    """
+
+    samples: np.ndarray
+    projective: bool
+    to_plane: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
+    axis: tuple[float, ...] = (0.0, 0.0, 1.0)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        return self.samples.shape[:2]
+
+    @cached_property
+    def ordinate(self) -> np.ndarray:
+        """Inverse depth or height of every pixel, NaN where invalid."""
+        if self.samples.ndim == 2:
+            return self.samples
+        along = self.samples @ np.asarray(self.axis, self.samples.dtype)
+        if not self.projective:
+            return -along
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(along > 0, 1 / along, np.nan).astype(self.samples.dtype)
+
+    @cached_property
+    def valid(self) -> np.ndarray:
+        """uint8, 1 where a pixel has data."""
+        return np.isfinite(self.ordinate).view(np.uint8)
+
+    @cached_property
+    def depth(self) -> np.ndarray:
+        """Distance along the viewing axis, NaN where invalid."""
+        return 1 / self.ordinate if self.projective else -self.ordinate
+
+    @cached_property
+    def boundary(self) -> np.ndarray:
+        """uint8, 1 at valid pixels with an invalid one among their eight neighbours."""
+        inner = cv2.erode(self.valid, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=1)
+        return self.valid & (1 - inner)
+
+    @property
+    def kernel_args(self) -> tuple[Any, ...]:
+        """What every kernel on scan lines takes first."""
+        return self.samples, self.projective, self.to_plane, self.axis
+
+
+def range_frame(
+    func: str,
+    src: np.ndarray,
+    K: Any = None,
+    pixelSize: Any = None,
+    heightMap: bool = False,
+    depthFactor: float = 1000.0,
+    mask: np.ndarray | None = None,
+) -> RangeFrame:
+    """Check `src` and its geometry once, and bring them to one form."""
+    src = array(func, "src", src, SRC, ndim=(2, 3))
+    heightMap = boolean(func, "heightMap", heightMap)
+    depthFactor = number(func, "depthFactor", depthFactor, 0, above=True)
+    if K is not None and pixelSize is not None:
+        raise fail(func, "pixelSize", "None where K is given", described(pixelSize))
+    if K is not None and heightMap:
+        raise fail(func, "heightMap", "False where K is given (its values are depths)", heightMap)
+    if src.ndim == 3:
+        frame = _points(func, src, K, pixelSize, heightMap)
+    elif K is not None:
+        frame = _pinhole(_lengths(func, src, depthFactor), camera_matrix(func, K))
+    else:
+        frame = _grid(_lengths(func, src, depthFactor), _spacing(func, pixelSize), heightMap)
+    if mask is None:
+        return frame
+    outside = image8(func, "mask", mask, frame.shape) == 0
+    samples = frame.samples.copy() if np.shares_memory(frame.samples, src) else frame.samples
+    samples[outside] = np.nan
+    return RangeFrame(samples, frame.projective, frame.to_plane, frame.axis)
+
+
+def camera_matrix(func: str, K: Any) -> np.ndarray:
+    """A pinhole camera's matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in float64."""
+    expected = "a 3x3 camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with finite entries and fx, fy > 0"
+    try:
+        matrix = np.asarray(K, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise fail(func, "K", expected, described(K)) from None
+    if matrix.shape != (3, 3):
+        raise fail(func, "K", expected, f"shape {matrix.shape}", cv2.Error.StsBadSize)
+    if not np.isfinite(matrix).all() or matrix[0, 0] <= 0 or matrix[1, 1] <= 0 or matrix[1, 0] != 0:
+        raise fail(func, "K", expected, matrix.tolist())
+    if not np.array_equal(matrix[2], (0, 0, 1)):
+        raise fail(func, "K", expected, matrix.tolist())
+    return matrix
+
+
+def _spacing(func: str, pixelSize: Any) -> tuple[float, float]:
+    if pixelSize is None:
+        return 1.0, 1.0
+    if np.ndim(pixelSize) == 0:
+        h = number(func, "pixelSize", pixelSize, 0, above=True)
+        return h, h
+    if len(pixelSize) != 2:
+        raise fail(func, "pixelSize", "a length or a pair (dx, dy)", described(pixelSize))
+    dx, dy = (number(func, "pixelSize", h, 0, above=True) for h in pixelSize)
+    return dx, dy
+
+
+def _lengths(func: str, src: np.ndarray, depthFactor: float) -> np.ndarray:
+    """Values as float lengths, invalid integers as NaN; float32 and float64 arrays are passed on unchanged."""
+    if src.dtype.kind == "f":
+        return np.ascontiguousarray(src, dtype=np.float64 if src.dtype.itemsize > 4 else np.float32)
+    if src.dtype.kind == "b":
+        raise fail(func, "src", SRC + " of numbers", described(src), cv2.Error.StsUnsupportedFormat)
+    lengths = np.ascontiguousarray(src).astype(np.float32 if src.dtype.itemsize <= 2 else np.float64)
+    lengths[lengths <= 0] = np.nan
+    lengths /= lengths.dtype.type(depthFactor)
+    return lengths
+
+
+def _pinhole(depth: np.ndarray, K: np.ndarray) -> RangeFrame:
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        inverse = 1 / depth
+        # The inverse of 0, of a negative, of a denormal or of a non-finite depth is none of a point's.
+        inverse[~((inverse > 0) & (depth < np.inf) & (inverse < np.inf))] = np.nan
+    return RangeFrame(inverse, True, tuple(np.linalg.inv(K)[:2].ravel().tolist()))
+
+
+def _grid(values: np.ndarray, spacing: tuple[float, float], heightMap: bool) -> RangeFrame:
+    height = values if heightMap else -values
+    infinite = np.isinf(height)
+    if infinite.any():
+        height = np.where(infinite, height.dtype.type(np.nan), height)
+    return RangeFrame(height, False, (spacing[0], 0.0, 0.0, 0.0, spacing[1], 0.0))
+
+
+def _points(func: str, src: np.ndarray, K: Any, pixelSize: Any, heightMap: bool) -> RangeFrame:
+    if src.shape[2] not in (3, 4) or src.dtype.kind != "f":
+        raise fail(func, "src", SRC + ", points being floats", described(src), cv2.Error.StsUnsupportedFormat)
+    for name, value in (("K", K), ("pixelSize", pixelSize)):
+        if value is not None:
+            raise fail(func, name, "None where src holds points", described(value))
+    dtype = np.float64 if src.dtype.itemsize > 4 else np.float32
+    points = np.array(src[..., :3], dtype=dtype, order="C")
+    points[~np.isfinite(points).all(axis=2)] = np.nan
+    if heightMap:
+        return RangeFrame(points, False, axis=(0.0, 0.0, -1.0))
+    central = points[np.isfinite(points[..., 2])].astype(np.float64)
+    if not len(central) or not _is_projective(points):
+        return RangeFrame(points, False)
+    if central[:, 2].min() > 0:
+        return RangeFrame(points, True)
+    rays = central / np.maximum(np.linalg.norm(central, axis=1, keepdims=True), np.finfo(np.float64).tiny)
+    axis = rays.mean(axis=0)
+    length = np.linalg.norm(axis)
+    return RangeFrame(points, True, axis=tuple((axis / length).tolist()) if length > 0.1 else (0.0, 0.0, 1.0))
+
+
+def _is_projective(points: np.ndarray) -> bool:
+    """Whether rows and columns lie in planes through the origin rather than in planes along the z axis."""
+    z = np.array([0.0, 0.0, 1.0])
+    through_origin, along_axis = [], []
+    height, width = points.shape[:2]
+    lines = [points[v] for v in np.unique(np.linspace(0, height - 1, 16).astype(int))]
+    lines += [points[:, u] for u in np.unique(np.linspace(0, width - 1, 16).astype(int))]
+    for line in lines:
+        line = line[np.isfinite(line[:, 0])].astype(np.float64)
+        if len(line) < 3:
+            continue
+        for normal, found in (
+            (np.cross(line[0], line[-1]), through_origin),
+            (np.cross(z, line[-1] - line[0]), along_axis),
+        ):
+            length = np.linalg.norm(normal)
+            offset = (line - line[0]) @ normal
+            found.append(np.sqrt(np.mean(offset**2)) / length if length > 0 else 0.0)
+    return not along_axis or np.median(through_origin) <= np.median(along_axis)
