@@ -120,28 +120,17 @@ def boolean(func: str, name: str, value: Any) -> bool:
 
 def camera_matrix(func: str, name: str, value: Any) -> np.ndarray:
     """The 3x3 matrix of a pinhole camera, as float64."""
-    expected = "a 3x3 camera matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]"
+    expected = "a 3x3 camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with finite entries and fx, fy > 0"
     try:
-        K = np.array(value, dtype=np.float64)
+        matrix = np.array(value, dtype=np.float64)
     except (TypeError, ValueError):
         raise fail(func, name, expected, described(value)) from None
-    if K.shape != (3, 3):
+    if matrix.shape != (3, 3):
         raise fail(func, name, expected, described(value), cv2.Error.StsBadSize)
-    canonical = K[0, 0] > 0 and K[1, 1] > 0 and K[0, 1] == K[1, 0] == 0 and np.array_equal(K[2], (0, 0, 1))
-    if not (canonical and np.isfinite(K).all()):
-        raise fail(func, name, f"{expected} with fx, fy > 0", np.array2string(K, separator=", ").replace("\n", ""))
-    return K
-
-
-def pixel_size(func: str, name: str, value: Any) -> tuple[float, float]:
-    """Distances of neighbouring columns and of neighbouring rows; one number stands for both."""
-    if isinstance(value, np.ndarray):
-        value = value.tolist()
-    if not isinstance(value, (tuple, list)):
-        value = (value, value)
-    if len(value) != 2:
-        raise fail(func, name, "(dx, dy) or one number", described(value))
-    return number(func, name, value[0], 0, above=True), number(func, name, value[1], 0, above=True)
+    upper = matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[1, 0] == 0 and np.array_equal(matrix[2], (0, 0, 1))
+    if not (upper and np.isfinite(matrix).all()):
+        raise fail(func, name, expected, matrix.tolist())
+    return matrix
 
 
 def deliver(func: str, name: str, result: np.ndarray, dst: np.ndarray | None) -> np.ndarray:
