@@ -119,9 +119,9 @@ def salienceDistanceTransform(
 
     Parameters
     ----------
-    salience : (H, W) CV_8U or CV_32F
+    salience : (H, W) CV_8U, bool or CV_32F
         Salience of every pixel, zero where there is no edge: s = value / 255 for 8 bits, as `overallStrength` returns
-        it; s = value for floats, which must lie in [0, 1].
+        it; s = value for floats, which must lie in [0, 1]; bool is 0 or 1.
     method : int
         ``SALIENCE_MULTIPLICATIVE`` (default) or ``SALIENCE_ADDITIVE``.
     dst : (H, W) CV_32F, optional
@@ -137,8 +137,8 @@ def salienceDistanceTransform(
     Raises
     ------
     error
-        If `salience` is not a non-empty 8-bit or float32 image, has values that are NaN, negative or above 1 (float), or
-        a parameter is out of range.
+        If `salience` is not a non-empty 8-bit, bool or float32 image, a float value is NaN, negative or above 1, or a
+        parameter is out of range.
 
     References
     ----------
@@ -211,16 +211,18 @@ def _binary(func: str, edges: np.ndarray) -> np.ndarray:
 
 def _salience(func: str, value: np.ndarray) -> np.ndarray:
     """A salience map as C-contiguous uint8 or float32, its values checked."""
-    expected = "a uint8 or float32 array of shape (H, W)"
-    value = array(func, "salience", value, expected)
-    if value.dtype not in (np.uint8, np.float32):
-        raise fail(func, "salience", expected, described(value), cv2.Error.StsUnsupportedFormat)
+    expected = "a uint8, bool or float32 array of shape (H, W)"
+    value = _indexable(func, "salience", array(func, "salience", value, expected))
+    if value.dtype == np.bool_:
+        return np.where(value, np.uint8(255), np.uint8(0))
     if value.dtype == np.uint8:
-        return _indexable(func, "salience", image8(func, "salience", value))
+        return image8(func, "salience", value)
+    if value.dtype != np.float32:
+        raise fail(func, "salience", expected, described(value), cv2.Error.StsUnsupportedFormat)
     low, high = value.min(), value.max()
     if not (low >= 0 and high <= 1):
         raise fail(func, "salience", "in [0, 1] where it is float32", f"{low:g} to {high:g}", cv2.Error.StsOutOfRange)
-    return _indexable(func, "salience", image32f(func, "salience", value))
+    return image32f(func, "salience", value)
 
 
 def _indexable(func: str, name: str, image: np.ndarray) -> np.ndarray:
