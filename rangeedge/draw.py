@@ -12,9 +12,10 @@ import numpy as np
 
 from . import _args
 from ._constants import EDGE_BOUNDARY, EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, EDGE_OCCLUDED
+from .geometry import range_frame
 from .selection import strengthImage
 
-_PLAIN = (0, 159, 230)  # an edge of no known kind: orange
+_PLAIN = (255, 255, 255)  # an edge of no known kind
 _KINDS = (  # later entries hide earlier ones
     (EDGE_BOUNDARY, (150, 150, 150), "beside no data"),
     (EDGE_CONCAVE, (233, 180, 86), "concave"),
@@ -51,7 +52,7 @@ def drawEdges(
     drawEdges(src, edges[, kind[, dst[, K[, heightMap]]]]) -> dst
 
     With `kind`: jump vermilion on the near side and purple on the far side, convex yellow, concave blue, beside no data
-    grey, unknown orange; a jump hides a crease. Without it every edge is orange. Pixels without data are hatched.
+    grey, anything else white; a jump hides a crease. Without it every edge is white. Pixels without data are hatched.
 
     Parameters
     ----------
@@ -63,10 +64,9 @@ def drawEdges(
         Bits `EDGE_JUMP`, `EDGE_CONVEX`, ... of every pixel, as :func:`edgeStrength` returns them.
     dst : ndarray of shape (H, W, 3), CV_8U, optional
         Receives the result where shape and type fit; it may be `src` itself.
-    K : ndarray of shape (3, 3), optional
-        Camera matrix: `src` is then depth, where 0 and negative values are no data.
-    heightMap : bool
-        Whether larger values are nearer the viewer.
+    K, heightMap
+        Geometry of a range image, as for :func:`edgeStrength`: a camera matrix makes 0 and negative values no data,
+        `heightMap` makes larger values nearer.
 
     Returns
     -------
@@ -82,11 +82,11 @@ def drawEdges(
     >>> import numpy as np
     >>> depth, edges = np.ones((4, 6), np.float32), np.zeros((4, 6), np.uint8)
     >>> edges[:, 2] = 255
-    >>> drawEdges(depth, edges)[0, 2]  # blue, green, red
-    array([  0, 159, 230], dtype=uint8)
+    >>> drawEdges(depth, edges)[0, 2]
+    array([255, 255, 255], dtype=uint8)
     """
     func = "drawEdges"
-    canvas = _backdrop(func, "src", src, K, heightMap)
+    canvas = _backdrop(func, src, K, heightMap)
     edges = _args.image8(func, "edges", edges, canvas.shape[:2])
     kind = None if kind is None else _args.image8(func, "kind", kind, edges.shape)
     _paint(canvas, _colour_index(edges != 0, kind))
@@ -145,7 +145,7 @@ def drawRegions(
     if src is None:
         canvas, alpha = np.zeros((*labels.shape, 3), np.uint8), 1.0
     else:
-        canvas = _backdrop(func, "src", src, K, heightMap, labels.shape)
+        canvas = _backdrop(func, src, K, heightMap, labels.shape)
     inside = labels > 0
     if inside.any():
         colours = _region_colours(labels, inside)
@@ -233,7 +233,7 @@ def drawOverview(
     title : str, optional
         A line above the panels.
     jumpCut, creaseCut : float
-        Strengths shown white, > 0; by default the 90th percentile of all jumps, and 64 degrees.
+        Strengths shown white, > 0; by default the median jump, and 64 degrees.
     K, heightMap
         As for :func:`drawEdges`.
 
@@ -256,7 +256,7 @@ def drawOverview(
     dtype('uint8')
     """
     func = "drawOverview"
-    depth = _depth(func, "src", src, K, heightMap)
+    depth = range_frame(func, src, K, heightMap=heightMap).depth
     jump, crease, kind = _strength(func, strength, depth.shape)
     edges = _args.image8(func, "edges", edges, depth.shape) != 0
     if distance is not None:
@@ -264,7 +264,7 @@ def drawOverview(
     if title is not None and not isinstance(title, str):
         raise _args.fail(func, "title", "a string or None", type(title).__name__)
     if jumpCut is None:
-        jumpCut = float(np.percentile(jump[jump > 0], 90)) if jump.any() else 1.0
+        jumpCut = float(np.median(jump[jump > 0])) if jump.any() else 1.0
     jumpCut = _args.number(func, "jumpCut", jumpCut, 0, above=True)
     creaseCut = _args.number(func, "creaseCut", creaseCut, 0, above=True)
 
@@ -279,38 +279,22 @@ def drawOverview(
         ("Selected edges", _paint(_subdued(relief), _thick(_colour_index(edges, kind), size))),
     ]
     if distance is not None:
-        panels.append((_distance_caption(distance), _resized(_distance_colours(distance, None, False), size)))
+        caption, picture = _distance_panel(distance, np.isfinite(depth))
+        panels.append((caption, _resized(picture, size)))
     return _sheet(panels, title)
 
 
 def _backdrop(
-    func: str, name: str, src: np.ndarray, K: np.ndarray | None, heightMap: bool, shape: tuple[int, int] | None = None
+    func: str, src: np.ndarray, K: np.ndarray | None, heightMap: bool, shape: tuple[int, int] | None = None
 ) -> np.ndarray:
     """A new picture to draw on: the one given, or the subdued relief of a range image."""
     if isinstance(src, np.ndarray) and src.dtype == np.uint8 and src.ndim == 3 and src.shape[2] == 3 and src.size:
         picture = src.copy()
     else:
-        picture = _subdued(_relief(_depth(func, name, src, K, heightMap)))
+        picture = _subdued(_relief(range_frame(func, src, K, heightMap=heightMap).depth))
     if shape is not None and picture.shape[:2] != shape:
-        raise _args.fail(func, name, f"of shape {shape}", _args.described(src), cv2.Error.StsUnmatchedSizes)
+        raise _args.fail(func, "src", f"of shape {shape}", _args.described(src), cv2.Error.StsUnmatchedSizes)
     return picture
-
-
-def _depth(func: str, name: str, src: np.ndarray, K: np.ndarray | None, heightMap: bool) -> np.ndarray:
-    """Distance from the viewer as float32, up to a constant; NaN where there is no data."""
-    expected = "a range image (H, W), or points (H, W, 3) or (H, W, 4) of floats"
-    src = _args.array(func, name, src, expected, (2, 3))
-    camera = K is not None and _args.camera_matrix(func, "K", K) is not None
-    sign = -1 if _args.boolean(func, "heightMap", heightMap) else 1
-    if src.ndim == 3:
-        if src.shape[2] not in (3, 4) or src.dtype.kind != "f":
-            raise _args.fail(func, name, expected, _args.described(src))
-        depth, valid = src[..., 2], np.isfinite(src[..., :3]).all(axis=2)
-    elif src.dtype.kind == "f":
-        depth, valid = src, np.isfinite(src) & ((src > 0) | (not camera))
-    else:
-        depth, valid = src, src > 0
-    return np.where(valid, sign * depth.astype(np.float32), np.float32(np.nan))
 
 
 def _distance(func: str, distance: np.ndarray, shape: tuple[int, int] | None = None) -> np.ndarray:
@@ -348,13 +332,13 @@ def _relief(depth: np.ndarray) -> np.ndarray:
 
 
 def _shade(depth: np.ndarray, valid: np.ndarray) -> np.ndarray:
-    """Light that a surface of this depth reflects, in [0.3, 1]; steepness relative to the image's own slopes."""
+    """Light that a surface of this depth reflects, in [0.25, 1]; steepness relative to the image's own slopes."""
     smooth = cv2.GaussianBlur(depth, (0, 0), 1.5)
     dx, dy = cv2.Scharr(smooth, cv2.CV_32F, 1, 0), cv2.Scharr(smooth, cv2.CV_32F, 0, 1)
     slope = np.hypot(dx, dy)
     typical = 2 * np.percentile(slope[valid], 75) or 1.0
-    cosine = (0.62 * typical - 0.55 * dx - 0.56 * dy) / np.hypot(slope, typical)
-    return np.clip(0.35 + 0.95 * cosine, 0.3, 1)
+    cosine = (0.52 * typical - 0.6 * dx - 0.6 * dy) / np.hypot(slope, typical)
+    return np.clip(0.3 + 0.75 * cosine, 0.25, 1)
 
 
 def _filled(depth: np.ndarray, valid: np.ndarray) -> np.ndarray:
@@ -473,9 +457,13 @@ def _depth_caption(depth: np.ndarray, heightMap: bool) -> str:
     return f"{name} {values.min():.4g} to {values.max():.4g}, {100 * values.size / depth.size:.0f} % valid"
 
 
-def _distance_caption(distance: np.ndarray) -> str:
-    finite = distance[np.isfinite(distance)]
-    return f"Distance to the edges, up to {finite.max():.3g}" if finite.size else "Distance: no edges"
+def _distance_panel(distance: np.ndarray, valid: np.ndarray) -> tuple[str, np.ndarray]:
+    """Distances on surfaces, with a scale of their own; hatched without data."""
+    finite = distance[valid & np.isfinite(distance)]
+    longest = float(finite.max(initial=0))
+    colours = _distance_colours(distance, longest or None, False)
+    caption = f"Distance to the edges, up to {longest:.3g}" if finite.size else "Distance: no edges"
+    return caption, np.where(valid[..., np.newaxis], colours, _hatch(valid.shape))
 
 
 def _sheet(panels: list[tuple[str, np.ndarray]], title: str | None) -> np.ndarray:
@@ -487,10 +475,8 @@ def _sheet(panels: list[tuple[str, np.ndarray]], title: str | None) -> np.ndarra
     columns = min((1, 2, 3, 6), key=lambda n: abs(np.log(n * width / (-(-len(cells) // n) * height) * 9 / 16)))
     cells += [np.full_like(cells[0], _BACKGROUND)] * (-len(cells) % columns)
     rows = [np.hstack(cells[i : i + columns]) for i in range(0, len(cells), columns)]
-    legend = [("edge", _PLAIN), *((text, colour) for _, colour, text in _KINDS)][::-1]
-    strips = [_key(legend, rows[0].shape[1])]
     top = [] if title is None else [_bar(title, rows[0].shape[1])]
-    return np.vstack([*top, *rows, *strips])
+    return np.vstack([*top, *rows, _key(rows[0].shape[1])])
 
 
 def _cell(caption: str, picture: np.ndarray, width: int) -> np.ndarray:
@@ -510,10 +496,10 @@ def _text_width(text: str) -> int:
     return cv2.getTextSize(text, _FONT, _FONT_SCALE, 1)[0][0] + 12
 
 
-def _key(entries: list[tuple[str, tuple[int, int, int]]], width: int) -> np.ndarray:
-    """Colours with their meaning, on as many lines as they need."""
+def _key(width: int) -> np.ndarray:
+    """The colours of edges with their meaning, on as many lines as they need."""
     lines, x = [_bar("", width)], 6
-    for text, colour in entries:
+    for colour, text in [*((colour, text) for _, colour, text in reversed(_KINDS)), (_PLAIN, "other")]:
         needed = _text_width(text) + 24
         if x > 6 and x + needed > width:
             lines.append(_bar("", width))
