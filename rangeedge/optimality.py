@@ -6,11 +6,10 @@
 from __future__ import annotations
 
 import argparse
+import io
 import itertools
 import json
-import os
 import sys
-import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -20,6 +19,8 @@ import numpy as np
 
 from . import _args
 from ._constants import CREASE_MAX, CREASE_NORMAL
+from .edges import edgeStrength
+from .io import write_atomically
 
 MAX_SLANT = 70.0  # degrees; steeper planes are rarely seen (P§5)
 
@@ -266,7 +267,7 @@ def analyseOptimality(frequency: int = 32, crease: int = CREASE_MAX) -> Optimali
     Examples
     --------
     >>> print(analyseOptimality(8).statistics)
-    |E| 6.40 ± 7.60, largest 47, bias +5.99, over-estimated 80 %
+    |E| 6.41 ± 7.60, largest 47, bias +5.99, over-estimated 80 %
     """
     frequency = _args.integer("analyseOptimality", "frequency", frequency, 2, 64)
     crease = _args.flag("analyseOptimality", "crease", crease, _CREASE)
@@ -284,10 +285,11 @@ def analyseOptimality(frequency: int = 32, crease: int = CREASE_MAX) -> Optimali
         error = (_combined(first, second, crease) - true)[later]
         sums.add(error)
         histogram += np.bincount(_bin(error, _ERROR_EDGES), minlength=histogram.size)
-        over_slants.add((slant[i] * bins + slant[j])[later], np.abs(error))
+        for one, other in ((i, j), (j, i)):
+            over_slants.add((slant[one] * bins + slant[other])[later], np.abs(error))
         over_section.add(_bin(_section_slant(first, second, true)[later], _SLANT_EDGES), np.abs(error))
 
-    mean, deviation = (values.reshape(bins, bins) for values in over_slants.symmetric().mean_and_deviation())
+    mean, deviation = (values.reshape(bins, bins) for values in over_slants.mean_and_deviation())
     return OptimalityAnalysis(
         sums.statistics(),
         _ERROR_EDGES,
@@ -313,8 +315,8 @@ def measureDetector(
     measureDetector(normals1, normals2[, sigma[, crease[, size[, seed]]]]) -> errors
 
     Each pair is drawn by parallel projection on a grid of unit pitch, in turn as a convex and a concave edge through
-    the image centre, displaced by up to half a pixel. The strength is the median along the middle quarter of the true
-    edge line, at every point of it the largest within a pixel.
+    a random point within an eighth of `size` of the image centre. The strength is the median along the quarter of the
+    true edge line about that point, at every place the largest within a pixel.
 
     Parameters
     ----------
@@ -327,7 +329,7 @@ def measureDetector(
     size : int
         Height and width of the image, 16 to 512.
     seed : int
-        Of the noise and of the displacements.
+        Of the noise and of the places of the edges.
 
     Returns
     -------
@@ -339,8 +341,6 @@ def measureDetector(
     rangeedge.error
         On an argument of the wrong type, shape or range.
     """
-    from .edges import edgeStrength
-
     func = "measureDetector"
     normals1, normals2 = np.broadcast_arrays(*_normal_pair(func, normals1, normals2))
     if normals1.ndim != 2:
@@ -352,7 +352,7 @@ def measureDetector(
 
     errors = np.empty(len(normals1))
     for k, (normal1, normal2) in enumerate(zip(normals1, normals2, strict=True)):
-        centre = (size - 1) / 2 + rng.uniform(-0.5, 0.5, 2)
+        centre = (size - 1) / 2 + rng.uniform(-size / 8, size / 8, 2)
         depth = _plane_pair(normal1, normal2, centre, size, convex=k % 2 == 0)
         depth += rng.normal(0, sigma, depth.shape)
         # Without noise what is left is the rounding of single precision.
@@ -494,14 +494,6 @@ class _BinnedSums:
         for row, weights in zip(self._sums, (None, values, values**2), strict=True):
             row += np.bincount(index, weights, minlength=row.size)
 
-    def symmetric(self) -> _BinnedSums:
-        """Both orders of every pair, for bins (n, n)."""
-        n = int(self._sums.shape[1] ** 0.5)
-        square = self._sums.reshape(3, n, n)
-        result = _BinnedSums(n * n)
-        result._sums = (square + square.transpose(0, 2, 1)).reshape(3, -1)
-        return result
-
     def mean_and_deviation(self) -> tuple[np.ndarray, np.ndarray]:
         count, total, square = self._sums
         count = np.where(count > 0, count, np.nan)
@@ -523,7 +515,7 @@ def _edge_direction(normal1: np.ndarray, normal2: np.ndarray) -> np.ndarray:
 
 
 def _strength_along(strength: np.ndarray, direction: np.ndarray, centre: np.ndarray) -> float:
-    """Median strength along the middle quarter of the line through `centre` (x, y)."""
+    """Median strength along the line through `centre` (x, y), an eighth of the image to either side."""
     reach = len(strength) // 8
     points = centre + np.arange(-reach, reach + 1)[:, None] * direction
     x, y = np.rint(points).astype(int).T
@@ -534,63 +526,65 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Print the optimality of both combinations, in theory and measured; with --out write the data and plots."""
     parser = argparse.ArgumentParser(prog="python -m rangeedge.optimality", description=main.__doc__)
     parser.add_argument("--frequency", type=int, default=32, help="of the geodesic dome, 2 to 64 (default: 32)")
-    parser.add_argument("--pairs", type=int, default=300, help="planes pairs to measure the detector on (default: 300)")
+    parser.add_argument("--pairs", type=int, default=300, help="plane pairs to measure the detector on (default: 300)")
     parser.add_argument("--sigma", type=float, nargs="*", default=[0.0, 0.05, 0.2], help="noise in pixel pitches")
     parser.add_argument("--seed", type=int, default=0, help="of pairs and noise (default: 0)")
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder for figure6*.png and optimality.json")
     args = parser.parse_args(argv)
     try:
         theory = {name: analyseOptimality(args.frequency, value) for name, value in _CREASE.items()}
-        measured = _measured(args)
+        sample = _measurements(args)
     except _args.error as bad:
         parser.error(bad.err)
-    _print_table(theory, measured)
-    return 0 if args.out is None else _write(args.out, theory, measured)
+    _print_table(theory, sample)
+    return 0 if args.out is None else _write(args.out, theory, sample)
 
 
 class _Measurement(NamedTuple):
-    combination: str
-    sigma: float
+    source: str  # what was measured
+    combination: str  # name of the constant
     errors: np.ndarray
 
 
-def _measured(args: argparse.Namespace) -> list[_Measurement]:
-    """The detector's errors on a random sample of the pairs of the simulation."""
+def _measurements(args: argparse.Namespace) -> list[_Measurement]:
+    """Errors on a random sample of the pairs of the simulation, first in theory, then by the detector."""
     normals = geodesicDome(args.frequency, MAX_SLANT)
     rng = np.random.default_rng(args.seed)
-    pairs = [rng.choice(len(normals), 2, replace=False) for _ in range(args.pairs)]
-    if not pairs:
+    count = _args.integer("main", "pairs", args.pairs, 0)
+    if not count:
         return []
-    normals1, normals2 = normals[np.array(pairs).T]
-    return [
-        _Measurement(name, sigma, measureDetector(normals1, normals2, sigma, crease, seed=args.seed))
-        for sigma in args.sigma
-        for name, crease in _CREASE.items()
-    ]
+    pair = tuple(normals[np.array([rng.choice(len(normals), 2, replace=False) for _ in range(count)]).T])
+    rows = [_Measurement("theory", name, estimationError(*pair, crease)) for name, crease in _CREASE.items()]
+    for sigma in args.sigma:
+        for name, crease in _CREASE.items():
+            errors = measureDetector(*pair, sigma, crease, seed=args.seed)
+            rows.append(_Measurement(f"detector, sigma {sigma:g}", name, errors))
+    return rows
 
 
-def _print_table(theory: dict[str, OptimalityAnalysis], measured: list[_Measurement]) -> None:
+def _print_table(theory: dict[str, OptimalityAnalysis], sample: list[_Measurement]) -> None:
     print("Estimation error E = crease strength - true angle, in degrees")
     for name, analysis in theory.items():
-        print(f"  theory, {analysis.statistics.count} pairs  {name:14} {analysis.statistics}")
-    for name, sigma, errors in measured:
+        print(f"  {name:13}  theory, all {analysis.statistics.count} pairs: {analysis.statistics}")
+    for source, name, errors in sample:
         statistics = errorStatistics(errors)
-        print(f"  detector, sigma {sigma:g}, {statistics.count} of {errors.size} found  {name:14} {statistics}")
+        print(f"  {name:13}  {source}, {statistics.count} of {errors.size} pairs: {statistics}")
 
 
-def _write(out: Path, theory: dict[str, OptimalityAnalysis], measured: list[_Measurement]) -> int:
+def _write(out: Path, theory: dict[str, OptimalityAnalysis], sample: list[_Measurement]) -> int:
+    """Data as JSON and the plots of Figure 6; 1 where the plots cannot be drawn."""
     out.mkdir(parents=True, exist_ok=True)
     data = {
         "theory": {
             name: {key: _plain(value) for key, value in analysis._asdict().items()} for name, analysis in theory.items()
         },
-        "detector": [
-            {"crease": name, "sigma": sigma, "pairs": errors.size, **_plain(errorStatistics(errors))}
-            for name, sigma, errors in measured
+        "sample": [
+            {"source": source, "crease": name, "pairs": errors.size, **_plain(errorStatistics(errors))}
+            for source, name, errors in sample
         ],
     }
     text = json.dumps(data, indent=1, allow_nan=False)
-    _replace(out / "optimality.json", lambda file: file.write(text.encode()))
+    write_atomically(out / "optimality.json", text.encode())
     try:
         from matplotlib.figure import Figure
     except ImportError:
@@ -600,13 +594,14 @@ def _write(out: Path, theory: dict[str, OptimalityAnalysis], measured: list[_Mea
     for name, draw in panels.items():
         figure = Figure(figsize=(5, 4), layout="constrained")
         draw(figure.add_subplot())
-        _replace(out / f"figure6{name}.png", lambda file, figure=figure: figure.savefig(file, format="png", dpi=120))
+        _save(figure, out / f"figure6{name}.png")
     figure = Figure(figsize=(14, 8), layout="constrained")
-    for axes, (name, draw) in zip(figure.subplots(2, 3).flat, panels.items(), strict=False):
+    combined = figure.subplots(2, 3).ravel()
+    for axes, (name, draw) in zip(combined[:5], panels.items(), strict=True):
         draw(axes)
         axes.set_title(f"({name}) {axes.get_title()}")
-    _draw_measured(figure.axes[5], theory, measured)
-    _replace(out / "figure6.png", lambda file: figure.savefig(file, format="png", dpi=120))
+    _draw_sample(combined[5], sample)
+    _save(figure, out / "figure6.png")
     return 0
 
 
@@ -621,16 +616,10 @@ def _plain(value: Any) -> Any:
     return None if value != value else value
 
 
-def _replace(path: Path, write: Callable[[Any], Any]) -> None:
-    """Write a file whole or not at all."""
-    with tempfile.NamedTemporaryFile(dir=path.parent, suffix=path.suffix, delete=False) as file:
-        try:
-            write(file)
-            file.close()
-            os.replace(file.name, path)
-        except BaseException:
-            os.unlink(file.name)
-            raise
+def _save(figure: Any, path: Path) -> None:
+    png = io.BytesIO()
+    figure.savefig(png, format="png", dpi=120)
+    write_atomically(path, png.getvalue())
 
 
 def _panels(analysis: OptimalityAnalysis) -> dict[str, Callable[[Any], None]]:
@@ -651,7 +640,7 @@ def _panels(analysis: OptimalityAnalysis) -> dict[str, Callable[[Any], None]]:
 
     def over_section(values: np.ndarray, title: str) -> Callable[[Any], None]:
         def draw(axes: Any) -> None:
-            axes.stairs(values, analysis.slantEdges)
+            axes.stairs(values, analysis.slantEdges, baseline=None)
             axes.set(title=title, xlabel="angle A of the optimal section [°]", ylabel="[°]", ylim=(0, None))
 
         return draw
@@ -665,14 +654,15 @@ def _panels(analysis: OptimalityAnalysis) -> dict[str, Callable[[Any], None]]:
     }
 
 
-def _draw_measured(axes: Any, theory: dict[str, OptimalityAnalysis], measured: list[_Measurement]) -> None:
-    """Share of pairs up to an |E|, for the detector."""
-    for name, sigma, errors in measured:
+def _draw_sample(axes: Any, sample: list[_Measurement]) -> None:
+    """Share of the sampled pairs up to an |E|."""
+    for source, name, errors in sample:
         absolute = np.sort(np.abs(errors[np.isfinite(errors)]))
-        axes.plot(absolute, 100 * np.arange(1, absolute.size + 1) / absolute.size, label=f"{name}, σ = {sigma:g}")
-    axes.set(title="The detector's |E|", xlabel="|E| [°]", ylabel="pairs up to |E| [%]", xscale="symlog")
-    if measured:
-        axes.legend()
+        share = 100 * np.arange(1, absolute.size + 1) / errors.size
+        axes.plot(absolute, share, label=f"{name}, {source}", linestyle="--" if source == "theory" else "-")
+    axes.set(title="|E| of a sample", xlabel="|E| [°]", ylabel="pairs up to |E| [%]", xlim=(0, 30), ylim=(0, 100))
+    if sample:
+        axes.legend(loc="lower right", fontsize="x-small")
 
 
 if __name__ == "__main__":
