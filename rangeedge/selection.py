@@ -219,7 +219,7 @@ def _reaching(jump: np.ndarray, crease: np.ndarray, thresholds: tuple[float, flo
 
 
 def _at_least(strength: np.ndarray, threshold: float) -> np.ndarray:
-    if threshold > np.finfo(np.float32).max:
+    if threshold > float(np.finfo(np.float32).max):
         return np.zeros(strength.shape, bool)
     threshold = np.float32(threshold)
     return strength >= threshold if threshold > 0 else strength > 0
