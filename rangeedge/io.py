@@ -349,7 +349,8 @@ def _abw_calibration(name: str) -> int:
 
 def _read_abw(data: bytes, calibration: int) -> np.ndarray:
     """A Sun rasterfile of 8 bits: eight big-endian words, a colour map, rows padded to an even number of bytes."""
-    _expect(len(data), 32)
+    if len(data) < 32:
+        raise ValueError("it ends within its header")
     _, width, height, depth, _, kind, _, map_length = struct.unpack_from(">8I", data)
     if (height, width) != SCANNER_SIZE or depth != 8 or kind not in (0, 1):
         raise ValueError(f"a Sun rasterfile of {width} x {height}, {depth} bits, type {kind} is no ABW image")
