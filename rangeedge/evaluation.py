@@ -10,6 +10,7 @@ import numpy as np
 
 from . import _args
 from ._constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
+from .distance import distanceTransformWithLabels
 
 # Classes of a typed truth map: what a pixel truly is.
 TRUTH_NONE = 0
@@ -549,8 +550,6 @@ def _skeleton(edges: np.ndarray) -> np.ndarray:
 
 def _nearest(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distance to the nearest edge pixel in float64, inf without any, and that pixel's linear index, -1."""
-    from .distance import distanceTransformWithLabels
-
     height, width = edges.shape
     if not edges.any():
         return np.full(edges.shape, np.inf), np.full(edges.shape, -1)
