@@ -399,7 +399,8 @@ def _neighbours(region: np.ndarray) -> dict[int, set[int]]:
         (region[1:, :-1], region[:-1, 1:]),
     ):
         differ = a != b
-        for i, j in np.unique(np.stack([a[differ], b[differ]], axis=1), axis=0).tolist():
+        pairs = np.unique(a[differ] * (region.max() + 1) + b[differ])
+        for i, j in zip(*(part.tolist() for part in np.divmod(pairs, region.max() + 1)), strict=True):
             neighbours[i].add(j)
             neighbours[j].add(i)
     return neighbours
@@ -432,9 +433,10 @@ def _grey(strength: np.ndarray, cut: float, size: tuple[int, int]) -> np.ndarray
 
 
 def _panel_size(shape: tuple[int, int]) -> tuple[int, int]:
-    """Width and height of a panel: whole multiples of a small image, a large one reduced."""
+    """Width and height of a panel: whole multiples of a small image, a large one reduced, a panorama less so."""
     longer = max(shape)
-    scale = min(_PANEL_MAX / longer, -(-_PANEL_MIN // longer))
+    limit = _PANEL_MAX * np.clip(shape[1] / shape[0] / 2, 1, 3)
+    scale = min(limit / longer, -(-_PANEL_MIN // longer))
     return max(round(shape[1] * scale), 1), max(round(shape[0] * scale), 1)
 
 
