@@ -98,7 +98,9 @@ def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None)
         if image.geometry:
             range_frame("imreadRange", src, **image.geometry)
     except Exception as reason:  # NumPy, zipfile and OpenCV raise two dozen types on a garbled file
-        what = getattr(reason, "err", None) or str(reason) or type(reason).__name__
+        what = reason.err if isinstance(reason, cv2.error) else reason
+        if not isinstance(reason, (ValueError, cv2.error)):
+            what = f"it is garbled ({type(reason).__name__}: {reason})"
         raise _args.error("imreadRange", f"cannot read {name!r}: {what}", cv2.Error.StsParseError) from reason
     return RangeImage(src, image.geometry)
 
@@ -250,6 +252,18 @@ def _read_picture(data: bytes) -> np.ndarray:
     if picture is None:
         raise ValueError("OpenCV cannot decode it: it is truncated or garbled, or of a kind this OpenCV lacks")
     return picture
+
+
+def _read_png(data: bytes) -> np.ndarray:
+    """Checks first what libpng believes: the chunks' lengths, and a size that deflate (1032 to 1 at best) can reach."""
+    at = 8
+    while data[at + 4 : at + 8] != b"IEND":
+        if at + 12 > len(data):
+            raise ValueError("it is truncated, or the lengths of its chunks are garbled")
+        at += 12 + int.from_bytes(data[at : at + 4], "big")
+    if int.from_bytes(data[16:20], "big") * int.from_bytes(data[20:24], "big") > 1032 * len(data):
+        raise ValueError("its header promises more pixels than it can hold")
+    return _read_picture(data)
 
 
 def _write_picture(suffix: str, *dtypes: str) -> Callable[[np.ndarray], bytes]:
@@ -411,7 +425,7 @@ def _expect(found: int, needed: int, unit: str = "bytes") -> None:
 
 
 _READERS: tuple[tuple[re.Pattern[bytes], Callable[[bytes], np.ndarray | RangeImage]], ...] = (
-    (re.compile(rb"\x89PNG\r\n\x1a\n"), _read_picture),
+    (re.compile(rb"\x89PNG\r\n\x1a\n"), _read_png),
     (re.compile(rb"II[*+]\0|MM\0[*+]"), _read_picture),  # TIFF, BigTIFF
     (re.compile(rb"P[25]\s"), _read_picture),  # PGM
     (re.compile(rb"\x76\x2f\x31\x01"), _read_picture),  # EXR

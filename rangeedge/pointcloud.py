@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import re
 import struct
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -181,10 +182,11 @@ def read_ply(data: bytes) -> np.ndarray:
     index = next(iter(tables["range_grid"].values()))
     if rows * cols != len(index):
         raise ValueError(f"{rows} rows of {cols} columns do not hold the {len(index)} pixels of its range_grid")
-    if index.max() >= len(points):
-        raise ValueError(f"its range_grid refers to vertex {index.max()} of {len(points)}")
+    if not index.max() < len(points):
+        raise ValueError(f"its range_grid refers to vertex {index.max():g} of {len(points)}")
     image = np.full((rows * cols, 3), np.nan, np.float32)
-    image[index >= 0] = points[index[index >= 0]]
+    hit = index >= 0
+    image[hit] = points[index[hit].astype(np.int64)]
     return image.reshape(rows, cols, 3)
 
 
@@ -239,8 +241,11 @@ class _PlyBody:
             raise ValueError(f"its element {element.name} has no properties")
         if all(prop.length_type is None for prop in element.properties):
             return self._scalars(element)
-        rows = [[self._first(prop) for prop in element.properties] for _ in range(element.count)]
-        columns = np.array(rows, dtype=np.int64).reshape(element.count, len(element.properties)).T
+        try:
+            firsts = self._firsts(element)
+        except (struct.error, IndexError, OverflowError):
+            raise ValueError(f"it ends within its element {element.name}") from None
+        columns = np.array(firsts, dtype=np.float64).reshape(element.count, len(element.properties)).T
         return {prop.name: column for prop, column in zip(element.properties, columns, strict=True)}
 
     def _scalars(self, element: _Element) -> dict[str, np.ndarray]:
@@ -251,40 +256,60 @@ class _PlyBody:
         self.at = end
         return {prop.name: records[prop.name] for prop in element.properties}
 
-    def _first(self, prop: _Property) -> float:
-        length = 1 if prop.length_type is None else int(self._next(prop.length_type, 1)[0])
-        return self._next(prop.type, length)[0] if length else -1
+    def _firsts(self, element: _Element) -> list[float]:
+        readers = [
+            (self._struct(prop.length_type) if prop.length_type else None, self._struct(prop.type))
+            for prop in element.properties
+        ]
+        data, at, firsts = self.data, self.at, []
+        for _ in range(element.count):
+            for length_reader, item_reader in readers:
+                length = 1
+                if length_reader is not None:
+                    length = _length(length_reader.unpack_from(data, at)[0])
+                    at += length_reader.size
+                firsts.append(item_reader.unpack_from(data, at)[0] if length else -1)
+                at += length * item_reader.size
+        _require(data, at)
+        self.at = at
+        return firsts
 
-    def _next(self, kind: str, count: int) -> tuple[float, ...]:
-        end = self.at + count * int(kind[1])
-        if count < 0 or end > len(self.data):
-            raise ValueError("it ends within a list")
-        values = struct.unpack_from(f"{self.byte_order}{count}{_STRUCT_CODES[kind]}", self.data, self.at)
-        self.at = end
-        return values
+    def _struct(self, kind: str) -> struct.Struct:
+        return struct.Struct(self.byte_order + _STRUCT_CODES[kind])
 
 
 class _PlyText(_PlyBody):
     """The same of an ascii file, where every value is a word."""
 
     def __init__(self, data: bytes, start: int) -> None:
-        super().__init__(data, start, "")
-        self.words = data[start:].split()
-        self.at = 0
+        super().__init__(data[start:].split(), 0, "")
 
     def _scalars(self, element: _Element) -> dict[str, np.ndarray]:
         width = len(element.properties)
-        numbers = self._next("", element.count * width)
-        columns = np.array(numbers, dtype=np.float64).reshape(element.count, width).T
+        end = self.at + element.count * width
+        _require(self.data, end, "values")
+        columns = np.array([float(word) for word in self.data[self.at : end]]).reshape(element.count, width).T
+        self.at = end
         return {prop.name: column for prop, column in zip(element.properties, columns, strict=True)}
 
-    def _next(self, kind: str, count: int) -> tuple[float, ...]:
-        end = self.at + count
-        if count < 0 or end > len(self.words):
-            raise ValueError(f"it ends after {len(self.words)} values")
-        values = tuple(float(word) for word in self.words[self.at : end])
-        self.at = end
-        return values
+    def _firsts(self, element: _Element) -> list[float]:
+        firsts = []
+        for _ in range(element.count):
+            for prop in element.properties:
+                length = 1
+                if prop.length_type is not None:
+                    length = _length(int(self.data[self.at]))
+                    self.at += 1
+                firsts.append(float(self.data[self.at]) if length else -1)
+                self.at += length
+        _require(self.data, self.at, "values")
+        return firsts
+
+
+def _length(length: float) -> int:
+    if length < 0 or length != int(length):
+        raise ValueError(f"it has a list of length {length}")
+    return int(length)
 
 
 def _ply_header(data: bytes) -> tuple[dict[str, int], list[_Element], _PlyBody]:
@@ -341,9 +366,9 @@ def _points(columns: dict[str, np.ndarray]) -> np.ndarray:
     return points
 
 
-def _require(data: bytes, size: int) -> None:
+def _require(data: Sequence[Any], size: int, unit: str = "bytes") -> None:
     if len(data) < size:
-        raise ValueError(f"it is truncated: {len(data)} bytes where {size} are needed")
+        raise ValueError(f"it is truncated: {len(data)} {unit} where {size} are needed")
 
 
 def _numbers(text: bytes, count: int) -> np.ndarray:
