@@ -1,0 +1,133 @@
+"""Seeds: compact markers in the middle of surfaces, far from every edge (P§7)."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+
+from . import _core
+from ._args import array, described, error, fail, image8, image32f, number
+
+
+def extractSeeds(
+    distance: np.ndarray, *, minDistance: float = 3.0, separation: float = 0.75, mask: np.ndarray | None = None
+) -> tuple[int, np.ndarray]:
+    """Markers in the middle of surfaces: the peaks of a distance map, each with the plateau around it.
+
+    extractSeeds(distance, *[, minDistance[, separation[, mask]]]) -> retval, markers
+
+    A pixel is a peak by itself where every 8-connected path to a higher one drops below ``separation`` times its
+    distance; its seed is what can be reached from it without doing so, {p: D(p) >= separation D(peak)}. So a gap in an
+    edge does not join the seeds of both sides, as long as it is narrower than `separation` times the narrower side.
+    Seeds never touch.
+
+    Parameters
+    ----------
+    distance : (H, W) CV_32F
+        Distance to the nearest edge, from `distanceTransform` or `salienceDistanceTransform`; >= 0, +inf allowed. Where
+        pixels have no data, count them as edges of the map that is transformed, or leave them out by `mask`.
+    minDistance : float
+        Least distance of a peak, in pixels, > 0.
+    separation : float
+        Share of the lower of two peaks to which the way between them must drop for both to count, in (0, 1).
+    mask : (H, W) CV_8U or bool, optional
+        Where it is zero there are no seeds, nor ways between them.
+
+    Returns
+    -------
+    retval : int
+        Number of labels, that of the background included, as from `cv2.connectedComponents`: there are
+        ``retval - 1`` seeds.
+    markers : (H, W) CV_32S
+        1, 2, ... on the seeds in raster order of their first pixels, 0 elsewhere: what `cv2.watershed`,
+        `skimage.segmentation.watershed` and `growRegions` take as it is.
+
+    Raises
+    ------
+    error
+        If `distance` is not a real (H, W) image of values >= 0, `mask` does not fit it, or a parameter is out of range.
+
+    Notes
+    -----
+    Peaks as in h-maxima (Soille, Morphological Image Analysis, 6.3), with h as a share of the peak instead of a
+    constant, so that small and large surfaces are treated alike.
+
+    Examples
+    --------
+    >>> distance = np.float32([[0, 1, 2, 3, 2, 1, 2, 3, 4, 3, 2, 1, 0]])
+    >>> extractSeeds(distance, minDistance=2)
+    (3, array([[0, 0, 0, 1, 0, 0, 0, 2, 2, 2, 0, 0, 0]], dtype=int32))
+    """
+    return _seeds("extractSeeds", distance, minDistance, separation, mask)
+
+
+def extractSeedsWithStats(
+    distance: np.ndarray, *, minDistance: float = 3.0, separation: float = 0.75, mask: np.ndarray | None = None
+) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
+    """Markers in the middle of surfaces, with the extent and the centre of each.
+
+    extractSeedsWithStats(distance, *[, minDistance[, separation[, mask]]]) -> retval, markers, stats, centroids
+
+    Parameters
+    ----------
+    distance, minDistance, separation, mask
+        As for `extractSeeds`.
+
+    Returns
+    -------
+    retval, markers
+        As from `extractSeeds`.
+    stats : (retval, 5) CV_32S
+        Columns ``cv2.CC_STAT_LEFT``, ``CC_STAT_TOP``, ``CC_STAT_WIDTH``, ``CC_STAT_HEIGHT``, ``CC_STAT_AREA``; row 0 is
+        the background.
+    centroids : (retval, 2) CV_64F
+        Means (x, y) of the pixels; NaN for an empty background.
+
+    Raises
+    ------
+    error
+        As `extractSeeds`.
+
+    Examples
+    --------
+    >>> distance = np.float32([[0, 1, 2, 3, 2, 1, 2, 3, 4, 3, 2, 1, 0]])
+    >>> _, _, stats, centroids = extractSeedsWithStats(distance, minDistance=2)
+    >>> stats[1:, cv2.CC_STAT_AREA], centroids[1:, 0]
+    (array([1, 3], dtype=int32), array([3., 8.]))
+    """
+    count, markers = _seeds("extractSeedsWithStats", distance, minDistance, separation, mask)
+    return count, markers, *label_statistics(markers, count)
+
+
+def label_statistics(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Bounding box and area, and centroid, of every label 0 .. count - 1, as `cv2.connectedComponentsWithStats`."""
+    flat = labels.ravel()
+    area = np.bincount(flat, minlength=count)
+    first, last = (np.empty((count, 2), np.int32) for _ in range(2))
+    centroids = np.empty((count, 2))
+    for axis, coordinate in enumerate(np.indices(labels.shape, np.int32)[::-1]):
+        coordinate = coordinate.ravel()
+        first[:, axis], last[:, axis] = np.iinfo(np.int32).max, -1
+        np.minimum.at(first[:, axis], flat, coordinate)
+        np.maximum.at(last[:, axis], flat, coordinate)
+        with np.errstate(invalid="ignore"):
+            centroids[:, axis] = np.bincount(flat, weights=coordinate, minlength=count) / area
+    first[area == 0], last[area == 0] = 0, -1
+    return np.column_stack([first, last - first + 1, area]).astype(np.int32), centroids
+
+
+def _seeds(
+    func: str, distance: np.ndarray, minDistance: float, separation: float, mask: np.ndarray | None
+) -> tuple[int, np.ndarray]:
+    distance = image32f(func, "distance", array(func, "distance", distance, "a real array of shape (H, W)"))
+    if distance.size >= 2**31 - 1:
+        raise error(func, f"`distance` must have fewer than 2^31 pixels, got {distance.size}", cv2.Error.StsOutOfRange)
+    if not distance.min() >= 0:  # NaN fails, too
+        raise fail(func, "distance", ">= 0 everywhere", f"a least value of {distance.min():g}")
+    minDistance = number(func, "minDistance", minDistance, 0, above=True)
+    separation = number(func, "separation", separation, 0, 1, above=True)
+    if separation == 1:
+        raise fail(func, "separation", "below 1", described(separation), cv2.Error.StsOutOfRange)
+    mask = None if mask is None else image8(func, "mask", mask, distance.shape)
+    markers = np.empty(distance.shape, np.int32)
+    return _core.extract_seeds(distance, mask, minDistance, separation, markers) + 1, markers
