@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from . import _core
-from ._args import array, deliver, described, error, fail, flag, image8, image32f, number
+from ._args import array, deliver, described, fail, flag, image8, image32f, number
 from ._constants import SALIENCE_ADDITIVE, SALIENCE_MULTIPLICATIVE
 
 _METHODS = {"SALIENCE_MULTIPLICATIVE": SALIENCE_MULTIPLICATIVE, "SALIENCE_ADDITIVE": SALIENCE_ADDITIVE}
@@ -121,7 +121,7 @@ def salienceDistanceTransform(
     ----------
     salience : (H, W) CV_8U, bool or CV_32F
         Salience of every pixel, zero where there is no edge: s = value / 255 for 8 bits, as `overallStrength` returns
-        it; s = value for floats, which must lie in [0, 1]; bool is 0 or 1.
+        it; s = value for floats, which must lie in [0, 1] (less than 2^-30 counts as zero); bool is 0 or 1.
     method : int
         ``SALIENCE_MULTIPLICATIVE`` (default) or ``SALIENCE_ADDITIVE``.
     dst : (H, W) CV_32F, optional
@@ -226,8 +226,9 @@ def _salience(func: str, value: np.ndarray) -> np.ndarray:
 
 
 def _indexable(func: str, name: str, image: np.ndarray) -> np.ndarray:
-    if image.size >= 2**31:
-        raise error(func, f"`{name}` must have fewer than 2^31 pixels, got {image.size}", cv2.Error.StsOutOfRange)
+    if image.size >= 2**31 or max(image.shape) > 2**24:
+        expected = "of fewer than 2^31 pixels and sides of at most 2^24"
+        raise fail(func, name, expected, described(image), cv2.Error.StsOutOfRange)
     return image
 
 

@@ -4,23 +4,15 @@
 #include <atomic>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <limits>
+#include <numeric>
 #include <vector>
 
 #include "parallel.hpp"
 
-// Loops over eight lanes are compiled twice and the wider form taken where the processor has it; without contraction
-// both round alike.
-#if defined(__x86_64__) && defined(__gnu_linux__) && defined(__GNUC__) && !defined(__SANITIZE_ADDRESS__)
-#define RANGEEDGE_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define RANGEEDGE_WIDE
-#endif
-
 namespace rangeedge {
 namespace {
-
-constexpr double INFINITE = std::numeric_limits<double>::infinity();
 
 std::size_t at(int index) { return static_cast<std::size_t>(index); }
 
@@ -33,6 +25,17 @@ template <class T>
 constexpr double UNIT = 1.0;
 template <>
 constexpr double UNIT<std::uint8_t> = 255.0;
+
+// What is less salient than 2^-30 counts as zero, so that weights have a bounded range.
+template <class T>
+bool is_salient(T value) {
+    return static_cast<double>(value) >= 0x1p-30;
+}
+
+void fill_unreached(std::size_t count, float* distance, std::int32_t* labels) {
+    std::fill_n(distance, count, std::numeric_limits<float>::infinity());
+    if (labels) std::fill_n(labels, count, -1);
+}
 
 // ---- |p - q|^2 + f(q): separable, by lower envelopes (Felzenszwalb and Huttenlocher) ----
 
@@ -133,8 +136,7 @@ void nearest_across_columns(int width, Penalty penalty, int first, int last, con
         }
         const auto& pieces = envelope.pieces();
         if (pieces.empty()) {
-            std::fill_n(distance + row, width, std::numeric_limits<float>::infinity());
-            if (labels) std::fill_n(labels + row, width, -1);
+            fill_unreached(at(width), distance + row, labels ? labels + row : nullptr);
             continue;
         }
         for (std::size_t k = 0; k < pieces.size(); ++k) {
@@ -166,367 +168,438 @@ void nearest_by_sum(int height, int width, IsSource is_source, Penalty penalty, 
 // ---- |p - q| / s(q): branch and bound over a quadtree of tiles and one of sources ----
 //
 // D^2 = min w(q) |p - q|^2 with w = 1 / s^2. For a tile of pixels and a block of sources w_min * (least distance)^2 is a
-// lower bound, and w * (largest distance)^2 of the block's strongest source an upper one; a block whose lower bound
-// exceeds the least upper bound has no say in the tile. Tiles are split into four, and the blocks left into theirs,
-// down to TILE x TILE pixels, where the sources left are compared one by one.
-// Bounds and comparisons carry rounding errors of a few 2^-24 (float); SLACK allows for more. Where two sources come
-// as close as that, the decision is exact.
+// lower bound, and w * (largest distance)^2 of the block's strongest source an upper one: a block whose lower bound
+// exceeds the least upper bound has no say in the tile. Tiles are split into four, and the blocks left into theirs, down
+// to TILE x TILE pixels. There a source goes that exceeds the one of the least upper bound on the whole tile, and those
+// left, about a dozen, are compared pixel by pixel.
+// All this is done in float. SLACK allows for its rounding in the bounds; where the two best sources of a pixel come too
+// close to tell, the choice is made exactly.
 
-constexpr int TILE = 8;
-constexpr int LANES = 8;
-constexpr double SLACK = 1.0 + 1.0 / (1 << 19);
+constexpr int TILE = 8, PIXELS = TILE * TILE;
+constexpr int LANES = 4;  // slots of a group: a block's four parts
+constexpr float SLACK = 1.0f / (1 << 19);
+constexpr float HUGE_WEIGHT = 0x1p64f, FAR_AWAY = -0x1p25f;  // of an empty slot: bounds above all others, and finite
 
-template <class Real>
-struct Sources {
-    std::vector<Real> weight, x, y;
+// A block of sources: its strongest one, the box around all of them, and the groups of its parts.
+struct Block {
+    float weight = HUGE_WEIGHT, x = FAR_AWAY, y = FAR_AWAY;
+    float left = FAR_AWAY, right = FAR_AWAY, top = FAR_AWAY, bottom = FAR_AWAY;
+    int begin = 0, end = 0;
+
+    bool empty() const { return begin == end; }
+
+    void add(const Block& part) {
+        if (empty()) {
+            *this = part;
+            return;
+        }
+        if (part.weight < weight) {
+            weight = part.weight;
+            x = part.x;
+            y = part.y;
+        }
+        left = std::min(left, part.left);
+        right = std::max(right, part.right);
+        top = std::min(top, part.top);
+        bottom = std::max(bottom, part.bottom);
+    }
+};
+
+struct Points {
+    std::vector<float> weight, x, y;
+
+    int groups() const { return static_cast<int>(weight.size()) / LANES; }
+};
+
+struct Blocks : Points {
+    std::vector<float> left, right, top, bottom;
+    std::vector<int> begin, end;
+
+    void push(const Block& block) {
+        weight.push_back(block.weight);
+        x.push_back(block.x);
+        y.push_back(block.y);
+        left.push_back(block.left);
+        right.push_back(block.right);
+        top.push_back(block.top);
+        bottom.push_back(block.bottom);
+        begin.push_back(block.begin);
+        end.push_back(block.end);
+    }
+};
+
+struct Sources : Points {
     std::vector<double> level, salience;  // as in the map, and in (0, 1]
     std::vector<std::int32_t> label;
-};
 
-// The non-empty blocks of one size: the box around their sources, the strongest of these, and where the parts begin.
-template <class Real>
-struct Blocks {
-    std::vector<Real> weight, x, y, left, right, top, bottom;
-    std::vector<int> first;  // of the next finer blocks, or of the sources; one entry more than blocks
-    int size() const { return static_cast<int>(weight.size()); }
-};
-
-template <class Real>
-struct Tree {
-    int height, width;
-    Sources<Real> sources;
-    std::vector<Blocks<Real>> levels;  // from blocks of TILE up, each twice as wide
-
-    int top() const { return static_cast<int>(levels.size()) - 1; }
-};
-
-template <class T, class Real>
-class TreeBuilder {
-public:
-    TreeBuilder(const T* salience, Tree<Real>& tree) : salience_(salience), tree_(tree) {}
-
-    void build() {
-        const int size = TILE << tree_.top();
-        for (int y = 0; y < tree_.height; y += size)
-            for (int x = 0; x < tree_.width; x += size) add_block(tree_.top(), y, x);
-        for (int level = 0; level <= tree_.top(); ++level)
-            tree_.levels[at(level)].first.push_back(parts(level));
+    void push(float w, float col, float row, double value, double s, std::int32_t index) {
+        weight.push_back(w);
+        x.push_back(col);
+        y.push_back(row);
+        level.push_back(value);
+        salience.push_back(s);
+        label.push_back(index);
     }
+};
+
+// The sources of a map in blocks of TILE << level pixels, four parts each, so that four neighbours in memory are bounded
+// at once.
+template <class T>
+class Tree {
+public:
+    Tree(const T* salience, int height, int width, int top)
+        : levels(at(top + 1)), salience_(salience), height_(height), width_(width) {
+        const int size = TILE << top;
+        for (int y = 0; y < height; y += size)
+            for (int x = 0; x < width; x += size) levels[at(top)].push(block(top, y, x));
+        while (levels[at(top)].weight.size() % LANES) levels[at(top)].push({});
+    }
+
+    Sources sources;
+    std::vector<Blocks> levels;
 
 private:
-    int parts(int level) const {
-        return level > 0 ? tree_.levels[at(level - 1)].size() : static_cast<int>(tree_.sources.label.size());
-    }
-
-    void add_block(int level, int y, int x) {
-        if (y >= tree_.height || x >= tree_.width) return;
-        const int begin = parts(level);
-        if (level == 0) {
-            add_sources(y, x);
-            close_block(level, begin, tree_.sources.x, tree_.sources.x, tree_.sources.y, tree_.sources.y,
-                        tree_.sources);
-        } else {
-            const int half = TILE << (level - 1);
-            for (int part = 0; part < 4; ++part) add_block(level - 1, y + part / 2 * half, x + part % 2 * half);
-            const Blocks<Real>& finer = tree_.levels[at(level - 1)];
-            close_block(level, begin, finer.left, finer.right, finer.top, finer.bottom, finer);
+    Block block(int level, int y, int x) {
+        if (y >= height_ || x >= width_) return {};
+        if (level == 0) return smallest_block(y, x);
+        const int half = TILE << (level - 1);
+        Block whole, parts[LANES];
+        for (int k = 0; k < LANES; ++k) {
+            parts[k] = block(level - 1, y + k / 2 * half, x + k % 2 * half);
+            if (!parts[k].empty()) whole.add(parts[k]);
         }
+        if (whole.empty()) return whole;
+        Blocks& finer = levels[at(level - 1)];
+        whole.begin = finer.groups();
+        whole.end = whole.begin + 1;
+        for (const Block& part : parts) finer.push(part);
+        return whole;
     }
 
-    void add_sources(int y0, int x0) {
-        Sources<Real>& sources = tree_.sources;
-        const int y1 = std::min(y0 + TILE, tree_.height), x1 = std::min(x0 + TILE, tree_.width);
-        for (int y = y0; y < y1; ++y)
+    Block smallest_block(int y0, int x0) {
+        const int y1 = std::min(y0 + TILE, height_), x1 = std::min(x0 + TILE, width_);
+        const int begin = sources.groups();
+        Block whole;
+        for (int y = y0; y < y1; ++y) {
+            const T* row = salience_ + pixel(y, 0, width_);
             for (int x = x0; x < x1; ++x) {
-                const std::size_t p = pixel(y, x, tree_.width);
-                if (!(salience_[p] > T(0))) continue;
-                const double level = static_cast<double>(salience_[p]), s = level / UNIT<T>;
-                sources.weight.push_back(static_cast<Real>(1.0 / (s * s)));
-                sources.x.push_back(static_cast<Real>(x));
-                sources.y.push_back(static_cast<Real>(y));
-                sources.level.push_back(level);
-                sources.salience.push_back(s);
-                sources.label.push_back(static_cast<std::int32_t>(p));
+                if (!is_salient(row[x])) continue;
+                const double level = static_cast<double>(row[x]), s = level / UNIT<T>;
+                const auto w = static_cast<float>(1.0 / (s * s)), col = static_cast<float>(x),
+                           line = static_cast<float>(y);
+                sources.push(w, col, line, level, s, static_cast<std::int32_t>(pixel(y, x, width_)));
+                whole.add({w, col, line, col, col, line, line, begin, begin + 1});
             }
-    }
-
-    // A block around the parts from `begin` on, if there are any.
-    template <class Parts>
-    void close_block(int level, int begin, const std::vector<Real>& left, const std::vector<Real>& right,
-                     const std::vector<Real>& top, const std::vector<Real>& bottom, const Parts& part) {
-        const int end = parts(level);
-        if (begin == end) return;
-        Blocks<Real>& blocks = tree_.levels[at(level)];
-        const auto strongest =
-            at(static_cast<int>(std::min_element(part.weight.begin() + begin, part.weight.begin() + end) -
-                                part.weight.begin()));
-        blocks.weight.push_back(part.weight[strongest]);
-        blocks.x.push_back(part.x[strongest]);
-        blocks.y.push_back(part.y[strongest]);
-        blocks.left.push_back(*std::min_element(left.begin() + begin, left.begin() + end));
-        blocks.right.push_back(*std::max_element(right.begin() + begin, right.begin() + end));
-        blocks.top.push_back(*std::min_element(top.begin() + begin, top.begin() + end));
-        blocks.bottom.push_back(*std::max_element(bottom.begin() + begin, bottom.begin() + end));
-        blocks.first.push_back(begin);
+        }
+        while (sources.weight.size() % LANES) sources.push(HUGE_WEIGHT, FAR_AWAY, FAR_AWAY, 0.0, 0.0, -1);
+        whole.end = sources.groups();
+        whole.begin = whole.empty() ? whole.end : begin;
+        return whole;
     }
 
     const T* salience_;
-    Tree<Real>& tree_;
+    int height_, width_;
 };
 
-// Candidates for a tile in flat arrays, padded to whole lanes with copies of the last.
-template <class Real>
+struct Tile {
+    int y, x;                        // its first pixel
+    float left, right, top, bottom;  // its first and last columns and rows inside the image
+};
+
+// Groups of slots copied into flat arrays.
 struct Candidates {
-    std::vector<Real> weight, x, y, left, right, top, bottom;
-    std::vector<int> id;
-    int count = 0;
+    std::vector<int> groups;
+    std::vector<float> weight, x, y, left, right, top, bottom;
 
-    // The parts of the blocks kept.
-    void expand(const std::vector<int>& kept, const std::vector<int>& first) {
-        id.clear();
-        for (const int k : kept)
-            for (int part = first[at(k)]; part < first[at(k + 1)]; ++part) id.push_back(part);
-        pad();
+    int count() const { return static_cast<int>(groups.size()) * LANES; }
+    int slot(int i) const { return groups[at(i / LANES)] * LANES + i % LANES; }
+
+    void gather(const Points& from) {
+        gather(from.weight, weight);
+        gather(from.x, x);
+        gather(from.y, y);
     }
 
-    void pad() {
-        count = static_cast<int>(id.size());
-        while (id.size() % LANES) id.push_back(id.back());
-    }
-
-    void copy(const Sources<Real>& sources) {
-        copy(sources.weight, weight);
-        copy(sources.x, x);
-        copy(sources.y, y);
-    }
-
-    void copy(const Blocks<Real>& blocks) {
-        copy(blocks.weight, weight);
-        copy(blocks.x, x);
-        copy(blocks.y, y);
-        copy(blocks.left, left);
-        copy(blocks.right, right);
-        copy(blocks.top, top);
-        copy(blocks.bottom, bottom);
+    void gather(const Blocks& from) {
+        gather(static_cast<const Points&>(from));
+        gather(from.left, left);
+        gather(from.right, right);
+        gather(from.top, top);
+        gather(from.bottom, bottom);
     }
 
 private:
-    void copy(const std::vector<Real>& from, std::vector<Real>& to) {
-        to.resize(id.size());
-        for (std::size_t i = 0; i < id.size(); ++i) to[i] = from[at(id[i])];
+    void gather(const std::vector<float>& from, std::vector<float>& to) const {
+        to.resize(at(count()));
+        for (std::size_t i = 0; i < groups.size(); ++i)
+            std::memcpy(&to[i * LANES], &from[at(groups[i]) * LANES], LANES * sizeof(float));
     }
 };
 
-template <class Real>
-struct Tile {
-    int y, x;                       // of its first pixel
-    Real left, right, top, bottom;  // its first and last columns and rows inside the image
+std::int32_t bits(float value) {
+    std::int32_t result;
+    std::memcpy(&result, &value, sizeof result);
+    return result;
+}
+
+float value_of(std::int32_t bits) {
+    float result;
+    std::memcpy(&result, &bits, sizeof result);
+    return result;
+}
+
+// The number of a candidate takes the place of the last bits of a float: so a minimum finds its argument as well.
+class Tag {
+public:
+    explicit Tag(int count) {
+        while (~mask_ + 1 < count) mask_ *= 2;
+    }
+
+    float set(float value, int number) const { return value_of((bits(value) & mask_) | number); }
+    int number(float tagged) const { return bits(tagged) & ~mask_; }
+    // The largest value that may have become `tagged`.
+    float above(float tagged) const { return value_of(bits(tagged) | ~mask_); }
+
+private:
+    std::int32_t mask_ = -1;
 };
 
-// Lower bounds of the candidates on a tile; returns the least upper bound, slack included.
-template <class Real>
-RANGEEDGE_WIDE Real bound_blocks(const Candidates<Real>& from, const Tile<Real>& tile, Real* lower) {
-    Real least[LANES];
-    std::fill_n(least, LANES, std::numeric_limits<Real>::max());
-    const Real *weight = from.weight.data(), *x = from.x.data(), *y = from.y.data();
-    const Real *left = from.left.data(), *right = from.right.data();
-    const Real *top = from.top.data(), *bottom = from.bottom.data();
-    const int count = static_cast<int>(from.id.size());
-    for (int i = 0; i < count; i += LANES)
-        for (int k = i; k < i + LANES; ++k) {
-            const Real near_x = std::max(std::max(left[k] - tile.right, tile.left - right[k]), Real(0));
-            const Real near_y = std::max(std::max(top[k] - tile.bottom, tile.top - bottom[k]), Real(0));
-            const Real far_x = std::max(x[k] - tile.left, tile.right - x[k]);
-            const Real far_y = std::max(y[k] - tile.top, tile.bottom - y[k]);
-            lower[k] = weight[k] * (near_x * near_x + near_y * near_y);
-            const Real upper = weight[k] * (far_x * far_x + far_y * far_y);
-            least[k - i] = std::min(least[k - i], upper);
-        }
-    return *std::min_element(least, least + LANES) * static_cast<Real>(SLACK);
+// Lower bounds of the blocks on a tile; returns the least upper bound. Floats that are not negative are ordered as their
+// bits, and minima of integers may be taken in any order, so that the loop runs on several lanes; likewise below.
+float bound(const Candidates& from, const Tile& tile, float* lower) {
+    const float *weight = from.weight.data(), *x = from.x.data(), *y = from.y.data();
+    const float *left = from.left.data(), *right = from.right.data();
+    const float *top = from.top.data(), *bottom = from.bottom.data();
+    std::int32_t least = std::numeric_limits<std::int32_t>::max();
+    const int count = from.count();
+    for (int k = 0; k < count; ++k) {
+        const float near_x = std::max(std::max(left[k] - tile.right, tile.left - right[k]), 0.0f);
+        const float near_y = std::max(std::max(top[k] - tile.bottom, tile.top - bottom[k]), 0.0f);
+        const float far_x = std::max(x[k] - tile.left, tile.right - x[k]);
+        const float far_y = std::max(y[k] - tile.top, tile.bottom - y[k]);
+        lower[k] = weight[k] * (near_x * near_x + near_y * near_y);
+        least = std::min(least, bits(weight[k] * (far_x * far_x + far_y * far_y)));
+    }
+    return value_of(least);
 }
 
-template <class Real>
-RANGEEDGE_WIDE Real bound_sources(const Candidates<Real>& from, const Tile<Real>& tile, Real* lower) {
-    Real least[LANES];
-    std::fill_n(least, LANES, std::numeric_limits<Real>::max());
-    const Real *weight = from.weight.data(), *x = from.x.data(), *y = from.y.data();
-    const int count = static_cast<int>(from.id.size());
-    for (int i = 0; i < count; i += LANES)
-        for (int k = i; k < i + LANES; ++k) {
-            const Real before_x = tile.left - x[k], after_x = x[k] - tile.right;
-            const Real before_y = tile.top - y[k], after_y = y[k] - tile.bottom;
-            const Real near_x = std::max(std::max(before_x, after_x), Real(0));
-            const Real near_y = std::max(std::max(before_y, after_y), Real(0));
-            const Real far_x = std::min(before_x, after_x), far_y = std::min(before_y, after_y);  // negative
-            lower[k] = weight[k] * (near_x * near_x + near_y * near_y);
-            const Real upper = weight[k] * (far_x * far_x + far_y * far_y);
-            least[k - i] = std::min(least[k - i], upper);
-        }
-    return *std::min_element(least, least + LANES) * static_cast<Real>(SLACK);
+// Upper bounds of the sources on a tile; returns the number of about the least one.
+int find_pivot(const Candidates& from, const Tile& tile, float* upper) {
+    const Tag tag(from.count());
+    const float *weight = from.weight.data(), *x = from.x.data(), *y = from.y.data();
+    std::int32_t least = std::numeric_limits<std::int32_t>::max();
+    const int count = from.count();
+    for (int k = 0; k < count; ++k) {
+        const float far_x = std::max(x[k] - tile.left, tile.right - x[k]);
+        const float far_y = std::max(y[k] - tile.top, tile.bottom - y[k]);
+        upper[k] = weight[k] * (far_x * far_x + far_y * far_y);
+        least = std::min(least, bits(tag.set(upper[k], k)));
+    }
+    return tag.number(value_of(least));
 }
 
-// For every pixel of a tile the least and second least w d^2 and the number of the candidate with the least.
-template <class Real>
-RANGEEDGE_WIDE void compare(int count, const Real* weight, const Real* x, const Real* y, int tile_y, int tile_x,
-                            Real (&least)[TILE][TILE], Real (&second)[TILE][TILE], int (&winner)[TILE][TILE]) {
-    Real column[TILE];
-    for (int c = 0; c < TILE; ++c) column[c] = static_cast<Real>(tile_x + c);
-    for (int r = 0; r < TILE; ++r) {
-        const Real row = static_cast<Real>(tile_y + r);
-        Real best[TILE], next[TILE];
-        int who[TILE] = {};
-        std::fill_n(best, TILE, std::numeric_limits<Real>::max());
-        std::fill_n(next, TILE, std::numeric_limits<Real>::max());
-        for (int i = 0; i < count; ++i) {
-            const Real dy2 = (row - y[i]) * (row - y[i]), w = weight[i], xi = x[i];
-            for (int c = 0; c < TILE; ++c) {
-                const Real value = w * ((column[c] - xi) * (column[c] - xi) + dy2);
-                next[c] = std::min(next[c], std::max(best[c], value));
-                who[c] = value < best[c] ? i : who[c];
-                best[c] = std::min(best[c], value);
-            }
+// The least of w (t - x)^2 - pivot_w (t - pivot_x)^2 over t in [0, length].
+inline float least_excess(float w, float x, float pivot_w, float pivot_x, float length) {
+    const auto excess = [=](float t) { return w * ((t - x) * (t - x)) - pivot_w * ((t - pivot_x) * (t - pivot_x)); };
+    const float vertex = (w * x - pivot_w * pivot_x) / (w - pivot_w);
+    const float inside = std::min(std::max(0.0f, vertex), length);  // 0 where w = pivot_w and there is no vertex
+    return std::min(std::min(excess(0.0f), excess(length)), excess(inside));
+}
+
+// By how much each source exceeds the pivot everywhere on the tile, less what rounding may amount to: one above 0 has no
+// say there. Coordinates from the tile's corner keep the error of the vertex small.
+void exceed(const Candidates& from, int pivot, const Tile& tile, const float* upper, float* excess) {
+    const float *weight = from.weight.data(), *x = from.x.data(), *y = from.y.data();
+    const float left = tile.left, top = tile.top, width = tile.right - left, height = tile.bottom - top;
+    const float pivot_w = weight[pivot], pivot_x = x[pivot] - left, pivot_y = y[pivot] - top;
+    const float pivot_upper = upper[pivot];
+    const int count = from.count();
+    for (int k = 0; k < count; ++k)
+        excess[k] = least_excess(weight[k], x[k] - left, pivot_w, pivot_x, width) +
+                    least_excess(weight[k], y[k] - top, pivot_w, pivot_y, height) - (upper[k] + pivot_upper) * SLACK;
+}
+
+// For every pixel of a tile the least and the second least w d^2, tagged with the number of the source.
+void compare(int count, const float* weight, const float* x, const float* y, const Tile& tile, const Tag& tag,
+             float* least, float* second) {
+    float column[PIXELS], row[PIXELS];
+    for (int p = 0; p < PIXELS; ++p) {
+        column[p] = tile.left + static_cast<float>(p % TILE);
+        row[p] = tile.top + static_cast<float>(p / TILE);
+    }
+    std::fill_n(least, PIXELS, std::numeric_limits<float>::max());
+    std::fill_n(second, PIXELS, std::numeric_limits<float>::max());
+    for (int i = 0; i < count; ++i) {
+        const float w = weight[i], xi = x[i], yi = y[i];
+        for (int p = 0; p < PIXELS; ++p) {
+            const float dx = column[p] - xi, dy = row[p] - yi;
+            const float value = tag.set(w * (dx * dx + dy * dy), i);
+            second[p] = std::min(second[p], std::max(least[p], value));
+            least[p] = std::min(least[p], value);
         }
-        std::copy_n(best, TILE, least[r]);
-        std::copy_n(next, TILE, second[r]);
-        std::copy_n(who, TILE, winner[r]);
     }
 }
 
-// Whether d2a / a^2 < d2b / b^2, exactly, for integers d2 below 2^53 and a, b of 24 bits.
-// 0: less, 1: equal... 
-inline int compare_exactly(double d2a, double a, double d2b, double b) {
+// The sign of d2a / a^2 - d2b / b^2 without rounding, for integers d2a, d2b below 2^53 and a, b of 24 bits: squares of
+// such are exact, and fma gives what rounding takes from a product.
+int compare_exactly(double d2a, double a, double d2b, double b) {
     const double left = d2a * (b * b), right = d2b * (a * a);
     if (left != right) return left < right ? -1 : 1;
-    const double rest_left = std::fma(d2a, b * b, -left), rest_right = std::fma(d2b, a * a, -right);
-    return rest_left < rest_right ? -1 : rest_left > rest_right;
+    const double left_rest = std::fma(d2a, b * b, -left), right_rest = std::fma(d2b, a * a, -right);
+    return (left_rest > right_rest) - (left_rest < right_rest);
 }
 
-template <class Real>
+template <class T>
 class Search {
 public:
-    Search(const Tree<Real>& tree, float* distance, std::int32_t* labels)
-        : tree_(tree), distance_(distance), labels_(labels), kept_(tree.levels.size() + 1),
-          candidates_(tree.levels.size() + 1) {
-        std::vector<int> all(at(tree.levels.back().size()));
-        for (std::size_t i = 0; i < all.size(); ++i) all[i] = static_cast<int>(i);
-        Candidates<Real>& roots = candidates_.back();
-        roots.id = all;
-        roots.pad();
-        roots.copy(tree.levels.back());
+    Search(const Tree<T>& tree, int height, int width, float* distance, std::int32_t* labels)
+        : tree_(tree), height_(height), width_(width), distance_(distance), labels_(labels),
+          blocks_(tree.levels.size()) {
+        Candidates& all = blocks_.back();
+        all.groups.resize(at(tree.levels.back().groups()));
+        std::iota(all.groups.begin(), all.groups.end(), 0);
+        all.gather(tree.levels.back());
     }
 
-    // Fills the tile of TILE << level pixels at (y, x) from the candidates of that level.
+    // Fills the tile of TILE << level pixels at (y, x), for which blocks_[level] are the candidates.
     void fill(int level, int y, int x) {
         const int size = TILE << level;
-        const Tile<Real> tile{y, x, static_cast<Real>(x), static_cast<Real>(std::min(x + size, tree_.width) - 1),
-                              static_cast<Real>(y), static_cast<Real>(std::min(y + size, tree_.height) - 1)};
-        const Candidates<Real>& from = candidates_[at(level + 1)];
-        std::vector<int>& kept = kept_[at(level + 1)];
-        lower_.resize(from.id.size());
-        keep(from, bound_blocks(from, tile, lower_.data()), kept);
-        Candidates<Real>& parts = candidates_[at(level)];
-        parts.expand(kept, tree_.levels[at(level)].first);
+        const Tile tile{y,
+                        x,
+                        static_cast<float>(x),
+                        static_cast<float>(std::min(x + size, width_) - 1),
+                        static_cast<float>(y),
+                        static_cast<float>(std::min(y + size, height_) - 1)};
+        Candidates& parts = level > 0 ? blocks_[at(level - 1)] : sources_;
+        expand(level, tile, parts.groups);
         if (level == 0) {
-            parts.copy(tree_.sources);
+            sources_.gather(tree_.sources);
             fill_pixels(tile);
             return;
         }
-        parts.copy(tree_.levels[at(level - 1)]);
+        parts.gather(tree_.levels[at(level - 1)]);
         const int half = size / 2;
-        for (int part = 0; part < 4; ++part) {
-            const int part_y = y + part / 2 * half, part_x = x + part % 2 * half;
-            if (part_y < tree_.height && part_x < tree_.width) fill(level - 1, part_y, part_x);
+        for (int k = 0; k < LANES; ++k) {
+            const int part_y = y + k / 2 * half, part_x = x + k % 2 * half;
+            if (part_y < height_ && part_x < width_) fill(level - 1, part_y, part_x);
         }
     }
 
 private:
-    void keep(const Candidates<Real>& from, Real limit, std::vector<int>& kept) {
-        kept.resize(at(from.count));
-        std::size_t count = 0;
-        for (int i = 0; i < from.count; ++i) {
-            kept[count] = from.id[at(i)];
-            count += lower_[at(i)] <= limit;
+    // The parts of those blocks that have a say in the tile.
+    void expand(int level, const Tile& tile, std::vector<int>& groups) {
+        const Candidates& from = blocks_[at(level)];
+        const Blocks& blocks = tree_.levels[at(level)];
+        lower_.resize(at(from.count()));
+        const float limit = bound(from, tile, lower_.data()) * (1.0f + SLACK);
+        groups.clear();
+        for (int i = 0; i < from.count(); ++i) {
+            if (lower_[at(i)] > limit) continue;
+            const std::size_t slot = at(from.slot(i));
+            for (int group = blocks.begin[slot]; group < blocks.end[slot]; ++group) groups.push_back(group);
         }
-        kept.resize(count);
     }
 
-    void fill_pixels(const Tile<Real>& tile) {
-        Candidates<Real>& from = candidates_[0];
-        lower_.resize(from.id.size());
-        const Real limit = bound_sources(from, tile, lower_.data());
-        int count = 0;
-        for (int i = 0; i < from.count; ++i) {
-            from.weight[at(count)] = from.weight[at(i)];
-            from.x[at(count)] = from.x[at(i)];
-            from.y[at(count)] = from.y[at(i)];
-            from.id[at(count)] = from.id[at(i)];
-            count += lower_[at(i)] <= limit;
+    void fill_pixels(const Tile& tile) {
+        keep_contenders(tile);
+        const int count = static_cast<int>(slot_.size());
+        const Tag tag(count);
+        float least[PIXELS], second[PIXELS];
+        compare(count, weight_.data(), x_.data(), y_.data(), tile, tag, least, second);
+        double squared[PIXELS], salience[PIXELS];
+        std::int32_t label[PIXELS];
+        for (int p = 0; p < PIXELS; ++p) {
+            int number = tag.number(least[p]);
+            const float close = tag.above(least[p]) * (1.0f + SLACK);
+            const double row = tile.y + p / TILE, col = tile.x + p % TILE;
+            if (second[p] <= close) number = nearest_exactly(row, col, close);
+            squared[p] = squared_distance(number, row, col);
+            const std::size_t slot = at(slot_[at(number)]);
+            salience[p] = tree_.sources.salience[slot];
+            label[p] = tree_.sources.label[slot];
         }
-        Real least[TILE][TILE], second[TILE][TILE];
-        int winner[TILE][TILE];
-        compare(count, from.weight.data(), from.x.data(), from.y.data(), tile.y, tile.x, least, second, winner);
-        const int rows = std::min(TILE, tree_.height - tile.y), cols = std::min(TILE, tree_.width - tile.x);
-        for (int r = 0; r < rows; ++r)
-            for (int c = 0; c < cols; ++c) {
-                const Real close = least[r][c] * static_cast<Real>(SLACK);
-                int source = from.id[at(winner[r][c])];
-                if (second[r][c] <= close) source = nearest_exactly(count, tile.y + r, tile.x + c, close);
-                const double dx = double(tree_.sources.x[at(source)]) - (tile.x + c),
-                             dy = double(tree_.sources.y[at(source)]) - (tile.y + r);
-                const std::size_t p = pixel(tile.y + r, tile.x + c, tree_.width);
-                distance_[p] = static_cast<float>(std::sqrt(dx * dx + dy * dy) / tree_.sources.salience[at(source)]);
-                if (labels_) labels_[p] = tree_.sources.label[at(source)];
-            }
+        float distance[PIXELS];
+        for (int p = 0; p < PIXELS; ++p) distance[p] = static_cast<float>(std::sqrt(squared[p]) / salience[p]);
+        const int cols = std::min(TILE, width_ - tile.x);
+        for (int r = 0; r < std::min(TILE, height_ - tile.y); ++r) {
+            std::copy_n(distance + r * TILE, cols, distance_ + pixel(tile.y + r, tile.x, width_));
+            if (labels_) std::copy_n(label + r * TILE, cols, labels_ + pixel(tile.y + r, tile.x, width_));
+        }
     }
 
-    // Of the candidates whose w d^2 is at most `close`, the truly nearest, of the lowest label.
-    int nearest_exactly(int count, int y, int x, Real close) const {
-        const Candidates<Real>& from = candidates_[0];
-        const Sources<Real>& sources = tree_.sources;
-        int best = -1;
-        double best_d2 = 0.0;
+    // Moves those sources that the pivot does not beat all over the tile into weight_, x_, y_, slot_.
+    void keep_contenders(const Tile& tile) {
+        const int count = sources_.count();
+        upper_.resize(at(count));
+        lower_.resize(at(count));
+        exceed(sources_, find_pivot(sources_, tile, upper_.data()), tile, upper_.data(), lower_.data());
+        slot_.clear();
+        weight_.clear();
+        x_.clear();
+        y_.clear();
         for (int i = 0; i < count; ++i) {
-            const Real dx = static_cast<Real>(x) - from.x[at(i)], dy = static_cast<Real>(y) - from.y[at(i)];
-            if (from.weight[at(i)] * (dx * dx + dy * dy) > close) continue;
-            const int source = from.id[at(i)];
-            const double d2 = double(dx) * double(dx) + double(dy) * double(dy);
-            const int order = best < 0 ? -1
-                                       : compare_exactly(d2, sources.level[at(source)], best_d2,
-                                                         sources.level[at(best)]);
-            if (order > 0 || (order == 0 && sources.label[at(source)] > sources.label[at(best)])) continue;
-            best = source;
-            best_d2 = d2;
+            if (lower_[at(i)] > 0.0f) continue;
+            slot_.push_back(sources_.slot(i));
+            weight_.push_back(sources_.weight[at(i)]);
+            x_.push_back(sources_.x[at(i)]);
+            y_.push_back(sources_.y[at(i)]);
+        }
+    }
+
+    double squared_distance(int number, double row, double col) const {
+        const double dy = row - double(y_[at(number)]), dx = col - double(x_[at(number)]);
+        return dy * dy + dx * dx;
+    }
+
+    // The nearest of the contenders whose w d^2 is at most about `close`, of the lowest label among equals.
+    int nearest_exactly(double row, double col, float close) const {
+        const Sources& sources = tree_.sources;
+        const double limit = double(close) * (1.0 + double(SLACK));
+        int best = -1;
+        double best_squared = 0.0;
+        for (int i = 0; i < static_cast<int>(slot_.size()); ++i) {
+            const double squared = squared_distance(i, row, col);
+            if (double(weight_[at(i)]) * squared > limit) continue;
+            const auto nearer = [&](std::size_t slot, std::size_t than) {
+                const int sign = compare_exactly(squared, sources.level[slot], best_squared, sources.level[than]);
+                return sign < 0 || (sign == 0 && sources.label[slot] < sources.label[than]);
+            };
+            if (best >= 0 && !nearer(at(slot_[at(i)]), at(slot_[at(best)]))) continue;
+            best = i;
+            best_squared = squared;
         }
         return best;
     }
 
-    const Tree<Real>& tree_;
+    const Tree<T>& tree_;
+    int height_, width_;
     float* distance_;
     std::int32_t* labels_;
-    std::vector<Real> lower_;
-    std::vector<std::vector<int>> kept_;
-    std::vector<Candidates<Real>> candidates_;  // [0]: sources, [level + 1]: blocks of a level
+    std::vector<Candidates> blocks_;  // by level
+    Candidates sources_;
+    std::vector<float> lower_, upper_;
+    std::vector<float> weight_, x_, y_;  // the contenders of a tile
+    std::vector<int> slot_;
 };
 
-constexpr int TOP_TILES = 256;
+constexpr int TOP_TILES = 256;  // at most
 
-template <class Real, class T>
+template <class T>
 void nearest_by_ratio(const T* salience, int height, int width, float* distance, std::int32_t* labels, int threads) {
-    const auto tiles = [](int length, int level) { return (length + (TILE << level) - 1) / (TILE << level); };
+    const auto tiles = [](int length, int level) { return (length - 1) / (TILE << level) + 1; };
     int top = 0;
     while (static_cast<long long>(tiles(height, top)) * tiles(width, top) > TOP_TILES) ++top;
-    Tree<Real> tree{height, width, {}, std::vector<Blocks<Real>>(at(top + 1))};
-    TreeBuilder<T, Real>(salience, tree).build();
+    const Tree<T> tree(salience, height, width, top);
     if (tree.sources.label.empty()) {
-        std::fill_n(distance, pixel(height, 0, width), std::numeric_limits<float>::infinity());
-        if (labels) std::fill_n(labels, pixel(height, 0, width), -1);
+        fill_unreached(pixel(height, 0, width), distance, labels);
         return;
     }
     const int size = TILE << top, columns = tiles(width, top), count = columns * tiles(height, top);
-    std::atomic<int> next{0};  // tiles differ in cost: each thread takes the next one
+    std::atomic<int> next{0};  // tiles differ in cost, so each thread takes another when it is done with one
     parallel_for(std::min(threads, count), threads, [&](int, int, int) {
-        Search<Real> search(tree, distance, labels);
-        for (int tile = next++; tile < count; tile = next++) search.fill(top, tile / columns * size, tile % columns * size);
+        Search<T> search(tree, height, width, distance, labels);
+        for (int tile = next++; tile < count; tile = next++)
+            search.fill(top, tile / columns * size, tile % columns * size);
     });
 }
 
@@ -548,13 +621,13 @@ void salience_additive(const T* salience, int height, int width, double lambda, 
         return std::nearbyint(lambda * lambda * (1.0 / (s * s) - 1.0) * GRAIN) / GRAIN;
     };
     nearest_by_sum(
-        height, width, [=](std::size_t p) { return salience[p] > T(0); }, penalty, distance, labels, threads);
+        height, width, [=](std::size_t p) { return is_salient(salience[p]); }, penalty, distance, labels, threads);
 }
 
 template <class T>
 void salience_multiplicative(const T* salience, int height, int width, float* distance, std::int32_t* labels,
                              int threads) {
-    nearest_by_ratio<float>(salience, height, width, distance, labels, threads);
+    nearest_by_ratio(salience, height, width, distance, labels, threads);
 }
 
 template void salience_multiplicative(const std::uint8_t*, int, int, float*, std::int32_t*, int);
