@@ -332,11 +332,8 @@ def renderScene(scene: Sequence[Solid], camera: Camera) -> Rendering:
 
 def grouped(every: Sequence[Face], numbers: np.ndarray) -> Iterator[tuple[Face, np.ndarray]]:
     """Each face that occurs in `numbers`, with the places where."""
-    order = np.argsort(numbers, kind="stable")
-    present, starts = np.unique(numbers[order], return_index=True)
-    for number, here in zip(present, np.split(order, starts[1:]), strict=True):
-        if number >= 0:
-            yield every[number], here
+    for number in np.unique(numbers[numbers >= 0]):
+        yield every[number], np.flatnonzero(numbers == number)
 
 
 def _labels(faces: np.ndarray) -> np.ndarray:
@@ -388,13 +385,14 @@ def _crossings(every: Sequence[Face], camera: Camera, depth: np.ndarray, faces: 
         is_first = np.isfinite(depth_first) & (depth_first <= hits(1, rays))
         low, high = np.where(is_first, middle, low), np.where(is_first, high, middle)
 
-    # Both surfaces where the view changes from one to the other (P§2: x0, f1 and f2).
+    # Both surfaces on the line of sight where the view changes from one to the other (P§2: x0, f1 and f2).
+    place = (low + high) / 2
+    origins, directions = rays_at(place)
     ahead = [
         after - before for before, after in zip(rays_at(np.zeros_like(low)), rays_at(np.ones_like(low)), strict=True)
     ]
     meets, normals, slopes = [], [], []
-    for side, (pixels, share) in enumerate(((first, low), (second, high))):
-        origins, directions = rays_at(share)
+    for side, pixels in enumerate((first, second)):
         meet, normal = np.empty(len(first)), np.empty((len(first), 3))
         for face, here in groups[side]:
             origin, along = origins[here], directions[here]
@@ -406,7 +404,7 @@ def _crossings(every: Sequence[Face], camera: Camera, depth: np.ndarray, faces: 
 
     jump = np.abs(meets[0] - meets[1])
     crossings = np.empty(len(first), _CROSSING)
-    crossings["x"], crossings["y"] = start + (low + high) / 2 * way
+    crossings["x"], crossings["y"] = start + place * way
     crossings["jump"] = np.where(jump <= TOUCHING * meets[0], 0, jump)
     crossings["crease"] = _angle(*normals)
     crossings["convex"] = slopes[0] < slopes[1]
