@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 
@@ -206,13 +208,13 @@ def _salience_transform(
 
 
 def _binary(func: str, edges: np.ndarray) -> np.ndarray:
-    return _indexable(func, "edges", image8(func, "edges", edges))
+    return image8(func, "edges", _indexable(func, "edges", edges))
 
 
 def _salience(func: str, value: np.ndarray) -> np.ndarray:
     """A salience map as C-contiguous uint8 or float32, its values checked."""
     expected = "a uint8, bool or float32 array of shape (H, W)"
-    value = _indexable(func, "salience", array(func, "salience", value, expected))
+    value = array(func, "salience", _indexable(func, "salience", value), expected)
     if value.dtype == np.bool_:
         return np.where(value, np.uint8(255), np.uint8(0))
     if value.dtype == np.uint8:
@@ -225,11 +227,12 @@ def _salience(func: str, value: np.ndarray) -> np.ndarray:
     return image32f(func, "salience", value)
 
 
-def _indexable(func: str, name: str, image: np.ndarray) -> np.ndarray:
-    if image.size >= 2**31 or max(image.shape) > 2**24:
+def _indexable(func: str, name: str, value: Any) -> Any:
+    """`value`, unless it is an image whose pixels CV_32S labels cannot number or whose columns floats cannot."""
+    if isinstance(value, np.ndarray) and (value.size >= 2**31 or max(value.shape, default=0) > 2**24):
         expected = "of fewer than 2^31 pixels and sides of at most 2^24"
-        raise fail(func, name, expected, described(image), cv2.Error.StsOutOfRange)
-    return image
+        raise fail(func, name, expected, described(value), cv2.Error.StsOutOfRange)
+    return value
 
 
 def _threads(image: np.ndarray) -> int:

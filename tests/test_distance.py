@@ -1,0 +1,359 @@
+"""Distance transforms against brute force over all pairs of pixels, in exact arithmetic."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import cv2
+import numpy as np
+import pytest
+
+import rangeedge
+from rangeedge._constants import SALIENCE_ADDITIVE, SALIENCE_MULTIPLICATIVE
+from rangeedge.distance import (
+    distanceTransform,
+    distanceTransformWithLabels,
+    salienceDistanceTransform,
+    salienceDistanceTransformWithLabels,
+)
+
+TRANSFORMS = [distanceTransform, salienceDistanceTransform]
+METHODS = [SALIENCE_MULTIPLICATIVE, SALIENCE_ADDITIVE]
+
+
+# Oracles: every source against every pixel, in order of index, so that the first of equals stays.
+
+
+def brute_multiplicative(salience):
+    """min |p - q| / s(q) of an 8-bit map, compared as integers: d^2 v'^2 < d'^2 v^2."""
+    height, width = salience.shape
+    rows, cols = np.mgrid[:height, :width]
+    squared, level = np.zeros((height, width), np.int64), np.zeros((height, width), np.int64)
+    labels = np.full((height, width), -1, np.int32)
+    for y, x in np.argwhere(salience):
+        d2, v = (rows - y) ** 2 + (cols - x) ** 2, int(salience[y, x])
+        nearer = (labels < 0) | (d2 * level**2 < squared * v**2)
+        squared[nearer], level[nearer], labels[nearer] = d2[nearer], v, y * width + x
+    with np.errstate(divide="ignore", invalid="ignore"):
+        distance = np.sqrt(squared.astype(np.float64)) / (level / 255.0)
+    return np.where(labels < 0, np.inf, distance).astype(np.float32), labels
+
+
+def brute_additive(salience, lambda_=10.0):
+    """sqrt(min |p - q|^2 + f(q)), f in whole steps of 2^-20."""
+    height, width = salience.shape
+    rows, cols = np.mgrid[:height, :width]
+    squared, labels = np.full((height, width), np.inf), np.full((height, width), -1, np.int32)
+    for y, x in np.argwhere(salience):
+        s = float(salience[y, x]) / (255.0 if salience.dtype == np.uint8 else 1.0)
+        penalty = np.rint(lambda_ * lambda_ * (1.0 / (s * s) - 1.0) * 2**20) / 2**20
+        cost = (rows - y) ** 2 + (cols - x) ** 2 + penalty
+        nearer = cost < squared
+        squared[nearer], labels[nearer] = cost[nearer], y * width + x
+    return np.sqrt(squared).astype(np.float32), labels
+
+
+def brute_distance(edges):
+    return brute_multiplicative(np.where(edges != 0, 255, 0).astype(np.uint8))
+
+
+def assert_same(result, expected):
+    for got, want in zip(result, expected, strict=True):
+        assert got.dtype == want.dtype
+        np.testing.assert_array_equal(got, want)
+
+
+# Maps that catch distance transforms out.
+
+
+def random_map(rng, shape, density, levels=255):
+    values = np.ceil(rng.integers(1, levels + 1, shape) * (255 / levels))
+    return np.where(rng.random(shape) < density, values, 0).astype(np.uint8)
+
+
+def ramps(shape):
+    """Edges whose strength rises along them."""
+    salience = np.zeros(shape, np.uint8)
+    cv2.rectangle(salience, (shape[1] // 5, shape[0] // 4), (4 * shape[1] // 5, 3 * shape[0] // 4), 255, 1)
+    return np.where(salience, np.linspace(1, 255, shape[1])[None, :], 0).astype(np.uint8)
+
+
+def walls(shape):
+    """Weak walls before a strong edge, which reappears behind them."""
+    salience = np.zeros(shape, np.uint8)
+    salience[:, shape[1] // 8] = 250
+    for k, level in enumerate((3, 9, 27, 80), start=2):
+        salience[shape[0] // 8 : -shape[0] // 8, k * shape[1] // 8] = level
+    return salience
+
+
+def single(shape, y, x, level):
+    salience = np.zeros(shape, np.uint8)
+    salience[y, x] = level
+    return salience
+
+
+def maps():
+    rng = np.random.default_rng(7)
+    yield "sparse", random_map(rng, (97, 131), 0.003)
+    yield "random", random_map(rng, (64, 80), 0.08)
+    yield "dense", random_map(rng, (24, 40), 1.0)
+    yield "few levels, many ties", random_map(rng, (60, 60), 0.05, levels=4)
+    yield "equal, many ties", random_map(rng, (60, 60), 0.05, levels=1)
+    yield "ramps", ramps((120, 150))
+    yield "walls", walls((128, 128))
+    yield "one strong among weak", np.maximum(random_map(rng, (70, 70), 0.1) // 85, single((70, 70), 3, 66, 255))
+    yield "single", single((33, 47), 20, 41, 17)
+    yield "corner", single((9, 8), 8, 7, 255)
+    yield "row", random_map(rng, (1, 300), 0.05)
+    yield "column", random_map(rng, (300, 1), 0.05)
+    yield "pixel", single((1, 1), 0, 0, 1)
+    yield "nothing", np.zeros((12, 20), np.uint8)
+
+
+CASES = [pytest.param(salience, id=name) for name, salience in maps()]
+
+
+@pytest.mark.parametrize("salience", CASES)
+def test_every_transform_equals_brute_force_at_every_thread_count(salience, monkeypatch):
+    monkeypatch.setattr("rangeedge.distance._WORTH_THREADS", 0)
+    distance, product, added = brute_distance(salience), brute_multiplicative(salience), brute_additive(salience)
+    for threads in (1, 2, 3, 8):
+        monkeypatch.setattr(cv2, "getNumThreads", lambda threads=threads: threads)
+        assert_same(distanceTransformWithLabels(salience), distance)
+        assert_same(salienceDistanceTransformWithLabels(salience), product)
+        assert_same(salienceDistanceTransformWithLabels(salience, SALIENCE_ADDITIVE), added)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_random_shapes_equal_brute_force(seed):
+    rng = np.random.default_rng(seed)
+    shape = tuple(rng.integers(1, 50, 2))
+    salience = random_map(rng, shape, rng.choice([0.02, 0.1, 0.5]), levels=rng.choice([1, 3, 17, 255]))
+    lambda_ = rng.choice([0.0, 0.5, 3.0, 40.0])
+    assert_same(distanceTransformWithLabels(salience), brute_distance(salience))
+    assert_same(salienceDistanceTransformWithLabels(salience), brute_multiplicative(salience))
+    assert_same(
+        salienceDistanceTransformWithLabels(salience, SALIENCE_ADDITIVE, lambda_=lambda_),
+        brute_additive(salience, lambda_),
+    )
+
+
+def test_large_map_equals_brute_force_at_every_thread_count(monkeypatch):
+    rng = np.random.default_rng(3)
+    salience = np.maximum(ramps((256, 256)), random_map(rng, (256, 256), 0.004))
+    expected = brute_multiplicative(salience)
+    for threads in (1, 2, 3, 8):
+        monkeypatch.setattr(cv2, "getNumThreads", lambda threads=threads: threads)
+        assert_same(salienceDistanceTransformWithLabels(salience), expected)
+
+
+@pytest.mark.parametrize("transform", TRANSFORMS)
+def test_by_hand(transform):
+    edges = np.array([[255, 0, 0], [0, 0, 0]], np.uint8)
+    expected = np.sqrt(np.array([[0, 1, 4], [1, 2, 5]], np.float64)).astype(np.float32)
+    np.testing.assert_array_equal(transform(edges), expected)
+
+
+def test_salience_by_hand():
+    salience = np.array([[51, 0, 0, 0, 0, 0, 0, 255]], np.uint8)  # s = 1/5 and 1
+    distance, labels = salienceDistanceTransformWithLabels(salience)
+    assert distance.tolist() == [[0, 5, 5, 4, 3, 2, 1, 0]]
+    assert labels.tolist() == [[0, 0, 7, 7, 7, 7, 7, 7]]
+    added, _ = salienceDistanceTransformWithLabels(salience, SALIENCE_ADDITIVE, lambda_=1.0)  # f = 24 and 0
+    np.testing.assert_array_equal(added, np.sqrt(np.float32([[24, 25, 25, 16, 9, 4, 1, 0]])))
+
+
+def test_equals_opencv_up_to_its_rounding():
+    edges = random_map(np.random.default_rng(5), (200, 300), 0.01)
+    theirs = cv2.distanceTransform((edges == 0).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    np.testing.assert_allclose(distanceTransform(edges), theirs, rtol=1e-5, atol=1e-5)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_full_salience_is_the_distance_transform(method):
+    edges = random_map(np.random.default_rng(6), (150, 190), 0.02, levels=1)
+    expected = distanceTransformWithLabels(edges)
+    assert_same(salienceDistanceTransformWithLabels(edges, method), expected)
+    assert_same(salienceDistanceTransformWithLabels(edges != 0, method), expected)
+    assert_same(salienceDistanceTransformWithLabels((edges != 0).astype(np.float32), method), expected)
+
+
+def test_both_forms_agree_at_lambda_from_a_single_edge():
+    salience = single((1, 40), 0, 3, 60)
+    product = salienceDistanceTransform(salience)
+    added = salienceDistanceTransform(salience, SALIENCE_ADDITIVE, lambda_=12.0)
+    assert added[0, 15] == pytest.approx(product[0, 15], rel=1e-6)
+    assert added[0, 14] > product[0, 14]
+    assert added[0, 16] < product[0, 16]
+
+
+def test_float_salience_is_compared_exactly():
+    """Levels so close together that only rational arithmetic tells all products apart."""
+    rng = np.random.default_rng(8)
+    levels = np.float32(0.75) + np.arange(-2, 3, dtype=np.float32) * np.spacing(np.float32(0.75))
+    salience = np.where(rng.random((14, 15)) < 0.3, rng.choice(levels, (14, 15)), 0).astype(np.float32)
+    _, labels = salienceDistanceTransformWithLabels(salience)
+    sources = [(int(y), int(x), Fraction(float(salience[y, x])) ** 2) for y, x in np.argwhere(salience)]
+    for (row, col), label in np.ndenumerate(labels):
+        nearest = min(sources, key=lambda q: (((q[0] - row) ** 2 + (q[1] - col) ** 2) / q[2], q[0], q[1]))
+        assert divmod(int(label), 15) == nearest[:2]
+
+
+def test_float_salience_equals_brute_force_in_double():
+    rng = np.random.default_rng(9)
+    salience = np.where(rng.random((60, 70)) < 0.05, 10.0 ** rng.uniform(-6, 0, (60, 70)), 0).astype(np.float32)
+    rows, cols = np.mgrid[:60, :70]
+    everything = [np.hypot(rows - y, cols - x) / float(salience[y, x]) for y, x in np.argwhere(salience)]
+    np.testing.assert_allclose(salienceDistanceTransform(salience), np.min(everything, axis=0), rtol=1e-7)
+    assert_same(salienceDistanceTransformWithLabels(salience, SALIENCE_ADDITIVE), brute_additive(salience))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_faintest_salience(method):
+    salience = np.zeros((3, 30), np.float32)
+    salience[1, 4] = 2.0**-30
+    distance, labels = salienceDistanceTransformWithLabels(salience, method)
+    assert distance[1, 6] == (2.0**31 if method == SALIENCE_MULTIPLICATIVE else np.float32(10 * 2.0**30))
+    assert (labels == 34).all()
+    salience[1, 4] = np.nextafter(np.float32(2.0**-30), np.float32(0))
+    assert np.isinf(salienceDistanceTransform(salience, method)).all()
+
+
+@pytest.mark.parametrize("shape", [(1, 70001), (70001, 1)])
+def test_lines_whose_squares_overflow_32_bits(shape):
+    edges = np.zeros(70001, np.uint8)
+    edges[[0, 70000]] = 255
+    position = np.arange(70001)
+    expected = np.minimum(position, 70000 - position).astype(np.float32), np.where(position <= 35000, 0, 70000)
+    expected = expected[0].reshape(shape), expected[1].astype(np.int32).reshape(shape)
+    assert_same(distanceTransformWithLabels(edges.reshape(shape)), expected)
+    for method in METHODS:
+        assert_same(salienceDistanceTransformWithLabels(edges.reshape(shape), method), expected)
+
+
+def test_far_and_weak():
+    salience = np.zeros((2, 20000), np.uint8)
+    salience[0, 0], salience[1, 19990] = 255, 1
+    distance, labels = salienceDistanceTransformWithLabels(salience)
+    x = np.arange(20000.0)
+    strong = np.sqrt(x**2 + np.array([[0.0], [1.0]]) ** 2)
+    weak = 255 * np.sqrt((x - 19990) ** 2 + np.array([[1.0], [0.0]]) ** 2)
+    np.testing.assert_array_equal(labels, np.where(strong <= weak, 0, 39990))
+    np.testing.assert_allclose(distance, np.minimum(strong, weak), rtol=1e-7)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_distances_follow_flips_and_transposition(method):
+    salience = random_map(np.random.default_rng(10), (53, 70), 0.03)
+    distance = salienceDistanceTransform(salience, method)
+    np.testing.assert_array_equal(salienceDistanceTransform(salience[::-1], method), distance[::-1])
+    np.testing.assert_array_equal(salienceDistanceTransform(salience[:, ::-1], method), distance[:, ::-1])
+    np.testing.assert_array_equal(salienceDistanceTransform(salience.T, method), distance.T)
+
+
+def test_multiplicative_form_scales_with_salience():
+    salience = random_map(np.random.default_rng(11), (50, 60), 0.05).astype(np.float32) / 256
+    np.testing.assert_array_equal(salienceDistanceTransform(salience / 4), 4 * salienceDistanceTransform(salience))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_stronger_edges_bring_every_pixel_nearer(method):
+    salience = random_map(np.random.default_rng(12), (50, 60), 0.05)
+    stronger = np.where(salience, np.minimum(salience.astype(int) + 40, 255), 0).astype(np.uint8)
+    assert (salienceDistanceTransform(stronger, method) <= salienceDistanceTransform(salience, method)).all()
+    assert (distanceTransform(salience) <= salienceDistanceTransform(salience, method)).all()
+
+
+def test_without_edges_everything_is_infinitely_far():
+    nothing = np.zeros((40, 50), np.uint8)
+    for distance, labels in (
+        distanceTransformWithLabels(nothing),
+        *(salienceDistanceTransformWithLabels(nothing, method) for method in METHODS),
+    ):
+        assert np.isposinf(distance).all()
+        assert (labels == -1).all()
+
+
+@pytest.mark.parametrize("transform", TRANSFORMS)
+def test_input_is_kept_and_may_be_strided(transform):
+    big = random_map(np.random.default_rng(13), (80, 90), 0.05)
+    view, before = big[::2, 1::3], big.copy()
+    np.testing.assert_array_equal(transform(view), transform(view.copy()))
+    np.testing.assert_array_equal(transform(np.asfortranarray(big)), transform(big))
+    np.testing.assert_array_equal(big, before)
+    big.flags.writeable = False
+    transform(big)
+
+
+@pytest.mark.parametrize("transform", TRANSFORMS)
+def test_bool_counts_as_full(transform):
+    edges = np.random.default_rng(14).random((30, 40)) < 0.05
+    np.testing.assert_array_equal(transform(edges), transform(edges.astype(np.uint8) * 255))
+
+
+@pytest.mark.parametrize("transform", TRANSFORMS)
+def test_dst_follows_opencv(transform):
+    edges = random_map(np.random.default_rng(15), (20, 30), 0.1)
+    expected = transform(edges)
+    fitting, strided = np.empty((20, 30), np.float32), np.empty((20, 60), np.float32)[:, ::2]
+    for dst in (fitting, strided):
+        assert transform(edges, dst=dst) is dst
+        np.testing.assert_array_equal(dst, expected)
+    for other in (np.zeros((20, 30), np.float64), np.zeros((3, 3), np.float32)):
+        np.testing.assert_array_equal(transform(edges, dst=other), expected)
+        assert not other.any()
+
+
+@pytest.mark.parametrize("transform", [*TRANSFORMS, distanceTransformWithLabels, salienceDistanceTransformWithLabels])
+@pytest.mark.parametrize(
+    "bad",
+    [
+        None,
+        [[0, 255]],
+        np.zeros((0, 4), np.uint8),
+        np.zeros(4, np.uint8),
+        np.zeros((2, 2, 3), np.uint8),
+        np.zeros((2, 2), np.int32),
+        np.zeros((2, 2), np.float64),
+        np.zeros((2, 2), complex),
+        np.broadcast_to(np.uint8(0), (2**16, 2**15)),
+        np.broadcast_to(np.uint8(0), (1, 2**24 + 1)),
+    ],
+    ids=["None", "list", "empty", "1-D", "3-D", "int32", "float64", "complex", "2^31 pixels", "side over 2^24"],
+)
+def test_bad_images(transform, bad):
+    with pytest.raises(rangeedge.error) as caught:
+        transform(bad)
+    assert caught.value.func == transform.__name__
+    assert "`edges`" in str(caught.value) or "`salience`" in str(caught.value)
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -1e-6, 1.0001, 80.0])
+def test_float_salience_outside_its_range(value):
+    salience = np.full((3, 4), 0.5, np.float32)
+    salience[1, 2] = value
+    for method in METHODS:
+        with pytest.raises(rangeedge.error, match=r"salience.*\[0, 1\]"):
+            salienceDistanceTransform(salience, method)
+
+
+@pytest.mark.parametrize("method", [2, -1, True, 0.0, "additive", None])
+def test_bad_method(method):
+    with pytest.raises(rangeedge.error, match="SALIENCE_ADDITIVE"):
+        salienceDistanceTransform(np.zeros((2, 2), np.uint8), method)
+
+
+@pytest.mark.parametrize("lambda_", [-1.0, np.nan, np.inf, 1e7, "ten", None])
+def test_bad_lambda(lambda_):
+    with pytest.raises(rangeedge.error, match="lambda_"):
+        salienceDistanceTransform(np.zeros((2, 2), np.uint8), SALIENCE_ADDITIVE, lambda_=lambda_)
+
+
+@pytest.mark.parametrize("transform", TRANSFORMS)
+def test_bad_dst(transform):
+    edges, locked = np.zeros((2, 2), np.uint8), np.zeros((2, 2), np.float32)
+    locked.flags.writeable = False
+    for dst in (locked, [[0.0, 0.0]]):
+        with pytest.raises(rangeedge.error, match="dst"):
+            transform(edges, dst=dst)
