@@ -353,7 +353,9 @@ def planePair(first: Vector, second: Vector, point: Vector = (0.0, 0.0, 1.0), co
     ]
 
 
-def roof(angle: float, orientation: float = 0.0, slant: float = 0.0, convex: bool = True, distance: float = 1.0):
+def roof(
+    angle: float, orientation: float = 0.0, slant: float = 0.0, convex: bool = True, distance: float = 1.0
+) -> list[Solid]:
     """Two half planes that meet on the optical axis under a crease of `angle` degrees.
 
     roof(angle[, orientation[, slant[, convex[, distance]]]]) -> scene

@@ -586,3 +586,17 @@ class TestErrors:
         bad(lambda: syn.twoCylinders(181), "twoCylinders", "`angle`")
         bad(lambda: syn.polyhedraScene(-1, CAMERAS["pinhole"]), "polyhedraScene", "`seed`")
         bad(lambda: syn.curvedScene(0, SMALL), "curvedScene", "`camera`")
+
+
+def test_nothing_in_view():
+    for camera, noise in (
+        (syn.kinectCamera(), syn.kinectNoise),
+        (syn.abwCamera(), syn.abwNoise),
+        (syn.perceptronCamera(), syn.perceptronNoise),
+        (syn.kinectCamera(), syn.triangulationNoise),
+    ):
+        rendering = syn.renderScene([syn.sphere((0, 0, -5), 1)], camera)
+        assert not rendering.labels.any()
+        assert not rendering.kind.any()
+        assert not rendering.jump.any()
+        assert not np.nan_to_num(noise(rendering).src).any()
