@@ -51,28 +51,37 @@ public:
 
     void reset(int length) {
         length_ = length;
-        pieces_.clear();
+        count_ = 0;
+        pieces_.resize(at(length));
     }
 
     void push(int position, double height, int label) {
-        int start = 0;
-        while (!pieces_.empty()) {
-            start = first_below(pieces_.back(), position, height, label);
-            if (start > pieces_.back().start) break;
-            pieces_.pop_back();
-        }
-        if (pieces_.empty()) start = 0;
-        if (start < length_) pieces_.push_back({height, position, label, start});
+        while (count_ > 0 && is_below(position, height, label, pieces_[at(count_ - 1)])) --count_;
+        const int start = count_ > 0 ? first_below(position, height, label, pieces_[at(count_ - 1)]) : 0;
+        if (start >= length_) return;
+        Piece& piece = pieces_[at(count_++)];
+        piece.height = height;
+        piece.position = position;
+        piece.label = label;
+        piece.start = start;
     }
 
-    const std::vector<Piece>& pieces() const { return pieces_; }
+    int size() const { return count_; }
+    const Piece& operator[](int k) const { return pieces_[at(k)]; }
+    int end(int k) const { return k + 1 < count_ ? pieces_[at(k + 1)].start : length_; }
 
 private:
+    // Whether the new parabola is the lower one already where the old piece starts.
+    static bool is_below(int position, double height, int label, const Piece& old) {
+        const double to_new = position - old.start, to_old = old.position - old.start;
+        const double rise = height + to_new * to_new - (old.height + to_old * to_old);
+        return rise < 0.0 || (rise == 0.0 && label < old.label);
+    }
+
     // The first x in 0 .. length at which the new parabola is the lower one.
-    int first_below(const Piece& old, int position, double height, int label) const {
-        const double step = 2.0 * (position - old.position);
-        const double gap = height - old.height + (position - old.position) * (double(position) + old.position);
-        if (gap < 0.0) return 0;
+    int first_below(int position, double height, int label, const Piece& old) const {
+        const double shift = position - old.position, step = 2.0 * shift;
+        const double gap = height - old.height + shift * (double(position) + old.position);
         if (gap > step * length_) return length_;
         int x = static_cast<int>(gap / step);
         const double rest = gap - step * x;  // exact, unlike the quotient
@@ -80,7 +89,7 @@ private:
         return rest == 0.0 && label < old.label ? x : x + 1;
     }
 
-    int length_ = 0;
+    int length_ = 0, count_ = 0;
     std::vector<Piece> pieces_;
 };
 
@@ -100,20 +109,21 @@ void nearest_in_columns(int height, int width, IsSource is_source, Penalty penal
                 if (is_source(p)) envelopes[c].push(y, penalty(p), y);
             }
         std::int32_t current[COLUMNS];
-        std::size_t next[COLUMNS] = {};
+        int next[COLUMNS] = {};
         int change[COLUMNS];  // the row at which the next piece begins
         for (int c = 0; c < count; ++c) {
             current[c] = -1;
-            change[c] = envelopes[c].pieces().empty() ? height : 0;
+            change[c] = envelopes[c].size() > 0 ? 0 : height;
         }
         for (int y = 0; y < height; ++y) {
+            std::int32_t* row = rows + pixel(y, x0, width);
             for (int c = 0; c < count; ++c) {
-                if (change[c] != y) continue;
-                const auto& pieces = envelopes[c].pieces();
-                current[c] = pieces[next[c]++].position;
-                change[c] = next[c] < pieces.size() ? pieces[next[c]].start : height;
+                if (change[c] == y) {
+                    current[c] = envelopes[c][next[c]].position;
+                    change[c] = envelopes[c].end(next[c]++);
+                }
+                row[c] = current[c];
             }
-            std::copy_n(current, count, rows + pixel(y, x0, width));
         }
     }
 }
@@ -134,18 +144,18 @@ void nearest_across_columns(int width, Penalty penalty, int first, int last, con
             const std::size_t label = pixel(source, x, width);
             envelope.push(x, dy * dy + penalty(label), static_cast<int>(label));
         }
-        const auto& pieces = envelope.pieces();
-        if (pieces.empty()) {
+        if (envelope.size() == 0) {
             fill_unreached(at(width), distance + row, labels ? labels + row : nullptr);
             continue;
         }
-        for (std::size_t k = 0; k < pieces.size(); ++k) {
-            const int end = k + 1 < pieces.size() ? pieces[k + 1].start : width;
-            for (int x = pieces[k].start; x < end; ++x) {
-                const double dx = x - pieces[k].position;
-                squared[at(x)] = dx * dx + pieces[k].height;
+        for (int k = 0; k < envelope.size(); ++k) {
+            const Envelope::Piece& piece = envelope[k];
+            const int end = envelope.end(k);
+            for (int x = piece.start; x < end; ++x) {
+                const double dx = x - piece.position;
+                squared[at(x)] = dx * dx + piece.height;
             }
-            if (labels) std::fill(labels + row + at(pieces[k].start), labels + row + at(end), pieces[k].label);
+            if (labels) std::fill(labels + row + at(piece.start), labels + row + at(end), piece.label);
         }
         for (int x = 0; x < width; ++x) distance[row + at(x)] = static_cast<float>(std::sqrt(squared[at(x)]));
     }
@@ -228,17 +238,19 @@ struct Blocks : Points {
     }
 };
 
-struct Sources : Points {
-    std::vector<double> level, salience;  // as in the map, and in (0, 1]
-    std::vector<std::int32_t> label;
+struct Source {
+    double level, salience;  // as in the map, and in (0, 1]
+    std::int32_t label;
+};
 
-    void push(float w, float col, float row, double value, double s, std::int32_t index) {
+struct Sources : Points {
+    std::vector<Source> exact;
+
+    void push(float w, float col, float row, const Source& source) {
         weight.push_back(w);
         x.push_back(col);
         y.push_back(row);
-        level.push_back(value);
-        salience.push_back(s);
-        label.push_back(index);
+        exact.push_back(source);
     }
 };
 
@@ -287,11 +299,11 @@ private:
                 const double level = static_cast<double>(row[x]), s = level / UNIT<T>;
                 const auto w = static_cast<float>(1.0 / (s * s)), col = static_cast<float>(x),
                            line = static_cast<float>(y);
-                sources.push(w, col, line, level, s, static_cast<std::int32_t>(pixel(y, x, width_)));
+                sources.push(w, col, line, {level, s, static_cast<std::int32_t>(pixel(y, x, width_))});
                 whole.add({w, col, line, col, col, line, line, begin, begin + 1});
             }
         }
-        while (sources.weight.size() % LANES) sources.push(HUGE_WEIGHT, FAR_AWAY, FAR_AWAY, 0.0, 0.0, -1);
+        while (sources.weight.size() % LANES) sources.push(HUGE_WEIGHT, FAR_AWAY, FAR_AWAY, {});
         whole.end = sources.groups();
         whole.begin = whole.empty() ? whole.end : begin;
         return whole;
@@ -493,8 +505,8 @@ private:
         lower_.resize(at(from.count()));
         const float limit = bound(from, tile, lower_.data()) * (1.0f + SLACK);
         groups.clear();
-        for (int i = 0; i < from.count(); ++i) {
-            if (lower_[at(i)] > limit) continue;
+        keep_up_to(limit);
+        for (const int i : kept_) {
             const std::size_t slot = at(from.slot(i));
             for (int group = blocks.begin[slot]; group < blocks.end[slot]; ++group) groups.push_back(group);
         }
@@ -502,7 +514,7 @@ private:
 
     void fill_pixels(const Tile& tile) {
         keep_contenders(tile);
-        const int count = static_cast<int>(slot_.size());
+        const int count = static_cast<int>(contenders_.size());
         const Tag tag(count);
         float least[PIXELS], second[PIXELS];
         compare(count, weight_.data(), x_.data(), y_.data(), tile, tag, least, second);
@@ -514,9 +526,8 @@ private:
             const double row = tile.y + p / TILE, col = tile.x + p % TILE;
             if (second[p] <= close) number = nearest_exactly(row, col, close);
             squared[p] = squared_distance(number, row, col);
-            const std::size_t slot = at(slot_[at(number)]);
-            salience[p] = tree_.sources.salience[slot];
-            label[p] = tree_.sources.label[slot];
+            salience[p] = contenders_[at(number)].salience;
+            label[p] = contenders_[at(number)].label;
         }
         float distance[PIXELS];
         for (int p = 0; p < PIXELS; ++p) distance[p] = static_cast<float>(std::sqrt(squared[p]) / salience[p]);
@@ -527,23 +538,35 @@ private:
         }
     }
 
-    // Moves those sources that the pivot does not beat all over the tile into weight_, x_, y_, slot_.
+    // Moves those sources that the pivot does not beat all over the tile into weight_, x_, y_, contenders_.
     void keep_contenders(const Tile& tile) {
         const int count = sources_.count();
         upper_.resize(at(count));
         lower_.resize(at(count));
         exceed(sources_, find_pivot(sources_, tile, upper_.data()), tile, upper_.data(), lower_.data());
-        slot_.clear();
-        weight_.clear();
-        x_.clear();
-        y_.clear();
-        for (int i = 0; i < count; ++i) {
-            if (lower_[at(i)] > 0.0f) continue;
-            slot_.push_back(sources_.slot(i));
-            weight_.push_back(sources_.weight[at(i)]);
-            x_.push_back(sources_.x[at(i)]);
-            y_.push_back(sources_.y[at(i)]);
+        keep_up_to(0.0f);
+        contenders_.resize(kept_.size());
+        weight_.resize(kept_.size());
+        x_.resize(kept_.size());
+        y_.resize(kept_.size());
+        for (std::size_t k = 0; k < kept_.size(); ++k) {
+            const std::size_t i = at(kept_[k]), slot = at(sources_.slot(kept_[k]));
+            weight_[k] = sources_.weight[i];
+            x_[k] = sources_.x[i];
+            y_[k] = sources_.y[i];
+            contenders_[k] = tree_.sources.exact[slot];
         }
+    }
+
+    // Into kept_ the numbers of the candidates with lower_ at most `limit`; without branches, which nothing could predict.
+    void keep_up_to(float limit) {
+        kept_.resize(lower_.size());
+        std::size_t count = 0;
+        for (std::size_t i = 0; i < lower_.size(); ++i) {
+            kept_[count] = static_cast<int>(i);
+            count += lower_[i] <= limit;
+        }
+        kept_.resize(count);
     }
 
     double squared_distance(int number, double row, double col) const {
@@ -553,18 +576,17 @@ private:
 
     // The nearest of the contenders whose w d^2 is at most about `close`, of the lowest label among equals.
     int nearest_exactly(double row, double col, float close) const {
-        const Sources& sources = tree_.sources;
         const double limit = double(close) * (1.0 + double(SLACK));
         int best = -1;
         double best_squared = 0.0;
-        for (int i = 0; i < static_cast<int>(slot_.size()); ++i) {
+        for (int i = 0; i < static_cast<int>(contenders_.size()); ++i) {
             const double squared = squared_distance(i, row, col);
             if (double(weight_[at(i)]) * squared > limit) continue;
-            const auto nearer = [&](std::size_t slot, std::size_t than) {
-                const int sign = compare_exactly(squared, sources.level[slot], best_squared, sources.level[than]);
-                return sign < 0 || (sign == 0 && sources.label[slot] < sources.label[than]);
+            const auto nearer = [&](const Source& source, const Source& than) {
+                const int sign = compare_exactly(squared, source.level, best_squared, than.level);
+                return sign < 0 || (sign == 0 && source.label < than.label);
             };
-            if (best >= 0 && !nearer(at(slot_[at(i)]), at(slot_[at(best)]))) continue;
+            if (best >= 0 && !nearer(contenders_[at(i)], contenders_[at(best)])) continue;
             best = i;
             best_squared = squared;
         }
@@ -578,8 +600,9 @@ private:
     std::vector<Candidates> blocks_;  // by level
     Candidates sources_;
     std::vector<float> lower_, upper_;
-    std::vector<float> weight_, x_, y_;  // the contenders of a tile
-    std::vector<int> slot_;
+    std::vector<float> weight_, x_, y_;  // of the contenders for a tile
+    std::vector<Source> contenders_;
+    std::vector<int> kept_;
 };
 
 constexpr int TOP_TILES = 256;  // at most
@@ -590,7 +613,7 @@ void nearest_by_ratio(const T* salience, int height, int width, float* distance,
     int top = 0;
     while (static_cast<long long>(tiles(height, top)) * tiles(width, top) > TOP_TILES) ++top;
     const Tree<T> tree(salience, height, width, top);
-    if (tree.sources.label.empty()) {
+    if (tree.sources.exact.empty()) {
         fill_unreached(pixel(height, 0, width), distance, labels);
         return;
     }
