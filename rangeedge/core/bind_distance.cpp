@@ -16,22 +16,22 @@ using Image = nb::ndarray<T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 int rows(const Image<float>& image) { return static_cast<int>(image.shape(0)); }
 int cols(const Image<float>& image) { return static_cast<int>(image.shape(1)); }
 
-void distance_transform(const Image<const std::uint8_t>& edges, const Image<float>& distance, const Image<std::int32_t>& labels,
-                        int threads) {
+void distance_transform(const Image<const std::uint8_t>& edges, const Image<float>& distance,
+                        const Image<std::int32_t>& labels, int threads) {
     rangeedge::distance_transform(edges.data(), rows(distance), cols(distance), distance.data(), labels.data(),
                                   threads);
 }
 
 template <class T>
-void salience_multiplicative(const Image<const T>& salience, const Image<float>& distance, const Image<std::int32_t>& labels,
-                             int threads) {
+void salience_multiplicative(const Image<const T>& salience, const Image<float>& distance,
+                             const Image<std::int32_t>& labels, int threads) {
     rangeedge::salience_multiplicative(salience.data(), rows(distance), cols(distance), distance.data(),
                                        labels.data(), threads);
 }
 
 template <class T>
-void salience_additive(const Image<const T>& salience, double lambda, const Image<float>& distance, const Image<std::int32_t>& labels,
-                       int threads) {
+void salience_additive(const Image<const T>& salience, double lambda, const Image<float>& distance,
+                       const Image<std::int32_t>& labels, int threads) {
     rangeedge::salience_additive(salience.data(), rows(distance), cols(distance), lambda, distance.data(),
                                  labels.data(), threads);
 }

@@ -11,6 +11,15 @@
 
 #include "parallel.hpp"
 
+// Marks the innermost loops, which are compiled a second time for processors with AVX2 and chosen at load time. Without
+// contraction both forms round alike. Sanitizers cannot run that early.
+#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
+    !defined(__SANITIZE_THREAD__)
+#define RANGEEDGE_WIDE __attribute__((target_clones("avx2", "default")))
+#else
+#define RANGEEDGE_WIDE
+#endif
+
 namespace rangeedge {
 namespace {
 
@@ -177,13 +186,13 @@ void nearest_by_sum(int height, int width, IsSource is_source, Penalty penalty, 
 
 // ---- |p - q| / s(q): branch and bound over a quadtree of tiles and one of sources ----
 //
-// D^2 = min w(q) |p - q|^2 with w = 1 / s^2. For a tile of pixels and a block of sources w_min * (least distance)^2 is a
-// lower bound, and w * (largest distance)^2 of the block's strongest source an upper one: a block whose lower bound
-// exceeds the least upper bound has no say in the tile. Tiles are split into four, and the blocks left into theirs, down
-// to TILE x TILE pixels. There a source goes that exceeds the one of the least upper bound on the whole tile, and those
-// left, about a dozen, are compared pixel by pixel.
-// All this is done in float. SLACK allows for its rounding in the bounds; where the two best sources of a pixel come too
-// close to tell, the choice is made exactly.
+// D^2 = min w(q) |p - q|^2 with w = 1 / s^2. For a tile of pixels and a block of sources w_min * (least distance)^2 is
+// a lower bound, and w * (largest distance)^2 of the block's strongest source an upper one: a block whose lower bound
+// exceeds the least upper bound has no say in the tile. Tiles are split into four, and the blocks left into theirs,
+// down to TILE x TILE pixels. There a source goes that exceeds the one of the least upper bound, the pivot, on the
+// whole tile, and those left, about a dozen, are compared pixel by pixel.
+// All this is done in float. SLACK allows for its rounding in the bounds; where the two best sources of a pixel come
+// too close to tell, the choice is made exactly.
 
 constexpr int TILE = 8, PIXELS = TILE * TILE;
 constexpr int LANES = 4;  // slots of a group: a block's four parts
@@ -254,8 +263,8 @@ struct Sources : Points {
     }
 };
 
-// The sources of a map in blocks of TILE << level pixels, four parts each, so that four neighbours in memory are bounded
-// at once.
+// The sources of a map in blocks of TILE << level pixels, four parts each, so that four neighbours in memory are
+// bounded at once.
 template <class T>
 class Tree {
 public:
@@ -376,9 +385,9 @@ private:
     std::int32_t mask_ = -1;
 };
 
-// Lower bounds of the blocks on a tile; returns the least upper bound. Floats that are not negative are ordered as their
-// bits, and minima of integers may be taken in any order, so that the loop runs on several lanes; likewise below.
-float bound(const Candidates& from, const Tile& tile, float* lower) {
+// Lower bounds of the blocks on a tile; returns the least upper bound. Floats that are not negative are ordered as
+// their bits, and minima of integers may be taken in any order, so that the loop runs on several lanes; likewise below.
+RANGEEDGE_WIDE float bound(const Candidates& from, const Tile& tile, float* lower) {
     const float *weight = from.weight.data(), *x = from.x.data(), *y = from.y.data();
     const float *left = from.left.data(), *right = from.right.data();
     const float *top = from.top.data(), *bottom = from.bottom.data();
@@ -396,7 +405,7 @@ float bound(const Candidates& from, const Tile& tile, float* lower) {
 }
 
 // Upper bounds of the sources on a tile; returns the number of about the least one.
-int find_pivot(const Candidates& from, const Tile& tile, float* upper) {
+RANGEEDGE_WIDE int find_pivot(const Candidates& from, const Tile& tile, float* upper) {
     const Tag tag(from.count());
     const float *weight = from.weight.data(), *x = from.x.data(), *y = from.y.data();
     std::int32_t least = std::numeric_limits<std::int32_t>::max();
@@ -418,9 +427,9 @@ inline float least_excess(float w, float x, float pivot_w, float pivot_x, float 
     return std::min(std::min(excess(0.0f), excess(length)), excess(inside));
 }
 
-// By how much each source exceeds the pivot everywhere on the tile, less what rounding may amount to: one above 0 has no
-// say there. Coordinates from the tile's corner keep the error of the vertex small.
-void exceed(const Candidates& from, int pivot, const Tile& tile, const float* upper, float* excess) {
+// By how much each source exceeds the pivot everywhere on the tile, less what rounding may amount to: one above 0 has
+// no say there. Coordinates from the tile's corner keep the error of the vertex small.
+RANGEEDGE_WIDE void exceed(const Candidates& from, int pivot, const Tile& tile, const float* upper, float* excess) {
     const float *weight = from.weight.data(), *x = from.x.data(), *y = from.y.data();
     const float left = tile.left, top = tile.top, width = tile.right - left, height = tile.bottom - top;
     const float pivot_w = weight[pivot], pivot_x = x[pivot] - left, pivot_y = y[pivot] - top;
@@ -432,8 +441,8 @@ void exceed(const Candidates& from, int pivot, const Tile& tile, const float* up
 }
 
 // For every pixel of a tile the least and the second least w d^2, tagged with the number of the source.
-void compare(int count, const float* weight, const float* x, const float* y, const Tile& tile, const Tag& tag,
-             float* least, float* second) {
+RANGEEDGE_WIDE void compare(int count, const float* weight, const float* x, const float* y, const Tile& tile,
+                            const Tag& tag, float* least, float* second) {
     float column[PIXELS], row[PIXELS];
     for (int p = 0; p < PIXELS; ++p) {
         column[p] = tile.left + static_cast<float>(p % TILE);
@@ -558,7 +567,7 @@ private:
         }
     }
 
-    // Into kept_ the numbers of the candidates with lower_ at most `limit`; without branches, which nothing could predict.
+    // Into kept_ the numbers of the candidates with lower_ at most `limit`; no branch, as none could be predicted.
     void keep_up_to(float limit) {
         kept_.resize(lower_.size());
         std::size_t count = 0;

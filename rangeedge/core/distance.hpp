@@ -11,8 +11,8 @@ namespace rangeedge {
 void distance_transform(const std::uint8_t* edges, int height, int width, float* distance, std::int32_t* labels,
                         int threads);
 
-// min over q of |p - q| / s(q). Sources are the pixels of salience above 0; the salience s is value / 255 for 8 bits and
-// the value itself, at most 1, for floats.
+// min over q of |p - q| / s(q). The salience s is value / 255 for 8 bits and the value itself, at most 1, for floats;
+// sources are the pixels where it is at least 2^-30.
 template <class T>
 void salience_multiplicative(const T* salience, int height, int width, float* distance, std::int32_t* labels,
                              int threads);
