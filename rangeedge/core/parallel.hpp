@@ -11,10 +11,10 @@
 namespace rangeedge {
 
 // Runs body(begin, end, thread) on contiguous chunks that cover [0, count), at most one chunk per thread, and returns
-// when all are done. `thread` counts from 0, so that each may own a buffer. Chunks depend on `threads`; results must not:
-// let body(begin, end, .) do for each index what body(index, index + 1, .) would. With one thread, or one index, the
-// body runs on the caller's own thread; whether the work is worth more threads is the caller's to say. Should any chunk
-// throw, the rest still finish and the first chunk's exception reaches the caller.
+// when all are done. `thread` counts from 0, so that each may own a buffer. Chunks depend on `threads`, results must
+// not: let body(begin, end, .) do for each index what body(index, index + 1, .) would. With one thread, or one index,
+// the body runs on the caller's own thread; whether the work is worth more threads is the caller's to say. Should any
+// chunk throw, the rest still finish and the first chunk's exception reaches the caller.
 template <class F>
 void parallel_for(int count, int threads, F&& body) {
     if (count <= 0) return;
