@@ -1,24 +1,97 @@
-"""The detector: edge candidates, strengths and kinds from scan line approximation (P§4)."""
+"""Edge strengths, kinds and positions from scan line approximation (P§4)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+import difflib
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import dataclass, fields
 from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 
 from . import _core
-from ._args import array, fail, flag, image32f, integer, number
-from ._constants import *  # noqa
+from ._args import array, described, error, fail, flag, integer, number
+from ._constants import (
+    CREASE_MAX,
+    CREASE_NORMAL,
+    DIR_ALL,
+    EDGE_BOUNDARY,
+    FIT_INTERP,
+    FIT_LSQ,
+    MEASURE_ENDPOINT,
+    MEASURE_MIDPOINT,
+)
 from .geometry import RangeFrame, range_frame
-from .noise import NoiseModel, noise_of
+from .noise import kernel_noise
+
+_THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
 
 
 @dataclass(frozen=True)
 class ScanLineParams:
+    """Every parameter of the detector, with its default.
+
+    ScanLineParams([eps[, epsFactor[, K[, ...]]]])
+
+    The functions that detect edges take each of these by keyword.
+
+    Parameters
+    ----------
+    eps : float or None
+        Splitting tolerance as a length, at the pixel's depth with a camera (P§4.1). None: `epsFactor` times the noise.
+    epsFactor : float
+        Splitting tolerance in standard deviations of the noise.
+    K : array_like of shape (3, 3) or None
+        Camera matrix; the values of `src` are then depths along the optical axis.
+    pixelSize : float or (float, float) or None
+        Spacing (dx, dy) of a regular grid in the unit of its values; None is 1.
+    heightMap : bool
+        Whether larger values are nearer to the viewer.
+    depthFactor : float
+        Divides integer values: 1000 makes metres of millimetres. Integer 0 is invalid.
+    noise : NoiseModel or float or ndarray of shape (H, W) or None
+        Standard deviation of the values as lengths; None estimates it from the image (`estimateNoise`).
+    directions : int
+        Scan lines to use: DIR_ROWS, DIR_COLS, DIR_DIAG45, DIR_DIAG135 combined by `|`, or DIR_ALL.
+    fit : int
+        FIT_LSQ, least squares over a segment, a line unless a quadratic is significant; or FIT_INTERP, the quadratic
+        through end points and midpoint. With FIT_INTERP cuts are neither merged nor cleared of rounded edges.
+    measure : int
+        MEASURE_MIDPOINT, strengths where the edge is; or MEASURE_ENDPOINT, extrapolated from either end point.
+    crease : int
+        CREASE_MAX, the largest directional angle (P§4.2); or CREASE_NORMAL, the angle between surface normals.
+    maxShift : float
+        How far, in pixels, the adapted edge position may lie from the cut (P§4.2, Fig. 5); 0 keeps the cut.
+    maxGap : int
+        Widest gap of invalid pixels on a scan line whose two sides are compared: occlusion shadows.
+    maxFillet : int
+        Longest segment, in pixels, that may be the rounding of an edge between its neighbours; 0 switches this off.
+    margin : int
+        Pixels beside each cut that fits leave out where a segment is long enough, since they may see both surfaces.
+    mergeSignificance : float
+        Cuts are taken back while that raises the sum of squares by less than its square, in noise variances; 0 keeps
+        all.
+    minSignificance : float
+        Candidates are dropped whose significance, joined with that of their neighbours, is below this; 0 keeps all.
+
+    Raises
+    ------
+    rangeedge.error
+        If a value is out of range. `K`, `pixelSize` and `noise` are checked together with the image.
+
+    Examples
+    --------
+    >>> ScanLineParams().maxShift
+    4.0
+    >>> ScanLineParams.paper().fit == FIT_INTERP
+    True
+    """
+
     eps: float | None = None
-    epsFactor: float = 6.0
+    epsFactor: float = 4.0
     K: Any = None
     pixelSize: Any = None
     heightMap: bool = False
@@ -29,38 +102,293 @@ class ScanLineParams:
     measure: int = MEASURE_MIDPOINT
     crease: int = CREASE_MAX
     maxShift: float = 4.0
-    maxGap: int = 0
+    maxGap: int = 8
+    maxFillet: int = 10
+    margin: int = 1
+    mergeSignificance: float = 6.5
     minSignificance: float = 10.0
+
+    def __post_init__(self) -> None:
+        func = "ScanLineParams"
+        if self.eps is not None:
+            number(func, "eps", self.eps, 0, above=True)
+        number(func, "epsFactor", self.epsFactor, 0, above=True)
+        integer(func, "directions", self.directions, 1, DIR_ALL)
+        flag(func, "fit", self.fit, {"FIT_LSQ": FIT_LSQ, "FIT_INTERP": FIT_INTERP})
+        measures = {"MEASURE_MIDPOINT": MEASURE_MIDPOINT, "MEASURE_ENDPOINT": MEASURE_ENDPOINT}
+        flag(func, "measure", self.measure, measures)
+        flag(func, "crease", self.crease, {"CREASE_MAX": CREASE_MAX, "CREASE_NORMAL": CREASE_NORMAL})
+        for name in ("maxShift", "mergeSignificance", "minSignificance"):
+            number(func, name, getattr(self, name), 0)
+        for name in ("maxGap", "maxFillet", "margin"):
+            integer(func, name, getattr(self, name), 0)
+
+    @classmethod
+    def paper(cls, **options: Any) -> ScanLineParams:
+        """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept."""
+        basic = {"fit": FIT_INTERP, "maxShift": 0.0, "maxGap": 0, "maxFillet": 0, "margin": 0}
+        return cls(**{**basic, "mergeSignificance": 0.0, "minSignificance": 0.0, **options})
 
 
 class EdgeStrength(NamedTuple):
-    jump: np.ndarray
-    crease: np.ndarray
-    kind: np.ndarray
-    significance: np.ndarray
+    """What `edgeStrength` returns, one value a pixel; 0 where there is no edge candidate."""
+
+    jump: np.ndarray  # CV_32F, length
+    crease: np.ndarray  # CV_32F, degrees
+    kind: np.ndarray  # CV_8U, EDGE_* bits
+    significance: np.ndarray  # CV_32F, standard deviations
 
 
-def _kernel_parameters(p: ScanLineParams):
-    return _core.Parameters(eps=p.eps or 0.0, eps_factor=p.epsFactor, directions=p.directions, interpolate=p.fit == FIT_INTERP,
-        endpoint=p.measure == MEASURE_ENDPOINT, max_shift=p.maxShift, max_gap=p.maxGap, min_significance=p.minSignificance, threads=cv2.getNumThreads())
+def params_of(func: str, eps: float | None, options: dict[str, Any]) -> ScanLineParams:
+    """The keywords of `func` as parameters; an error names `func`."""
+    names = [f.name for f in fields(ScanLineParams)]
+    for name in options:
+        if name not in names:
+            close = difflib.get_close_matches(name, names, 1)
+            hint = f"; did you mean `{close[0]}`?" if close else ""
+            raise error(func, f"unknown argument `{name}`{hint}")
+    try:
+        return ScanLineParams(eps=eps, **options)
+    except error as problem:
+        raise error(func, problem.err, problem.code) from None
 
 
-def edgeStrength(src, eps=None, *, mask=None, **options) -> EdgeStrength:
-    p = ScanLineParams(eps=eps, **options)
-    frame = range_frame("edgeStrength", src, p.K, p.pixelSize, p.heightMap, p.depthFactor, mask)
-    noise = p.noise if p.noise is not None else noise_of(frame)
-    if not isinstance(noise, NoiseModel):
-        noise = NoiseModel(c=noise) if frame.projective else NoiseModel(a=noise)
-    h, w = frame.shape
-    s = EdgeStrength(*(np.empty((h, w), t) for t in (np.float32, np.float32, np.uint8, np.float32)))
-    _core.edge_strength(*frame.kernel_args, (noise.a, noise.b, noise.c), None, _kernel_parameters(p), *s)
-    return s
+def takes_scan_line_params(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Show the fields of ScanLineParams in the signature of a function that takes them as `**options`."""
+    signature = inspect.signature(function)
+    own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
+    shown = [
+        inspect.Parameter(f.name, inspect.Parameter.KEYWORD_ONLY, default=f.default)
+        for f in fields(ScanLineParams)
+        if f.name not in signature.parameters
+    ]
+
+    @functools.wraps(function)
+    def with_options(*args: Any, **kwargs: Any) -> Any:
+        return function(*args, **kwargs)
+
+    with_options.__signature__ = signature.replace(parameters=own + shown)  # type: ignore[attr-defined]
+    return with_options
 
 
-def detectEdges(src, jumpThreshold=None, creaseThreshold=30.0, eps=None, edges=None, *, mask=None, **options):
-    s = edgeStrength(src, eps, mask=mask, **options)
-    jump = np.where(s.kind & EDGE_JUMP, s.jump, 0) if jumpThreshold is None else s.jump
-    from .selection import selectEdges
-    e = ((jump > (jumpThreshold or 0)) | (s.crease >= creaseThreshold)).astype(np.uint8) * 255
-    from skimage.morphology import skeletonize
-    return skeletonize(e > 0).astype(np.uint8) * 255
+def splitScanLine(z: np.ndarray, eps: float, pixelSize: float | np.ndarray = 1.0) -> np.ndarray:
+    """Split one scan line into quadratic segments.
+
+    splitScanLine(z, eps[, pixelSize]) -> segments
+
+    The quadratic through both end points and the midpoint of a run approximates it; where the largest residual
+    |z - f(x)| exceeds `eps` the run is cut, and both parts are treated the same way. The cut falls between two
+    samples: the extreme one joins the neighbour whose value is closer, the left one of two equals. The midpoint of
+    a run with an even number of samples is the left one of the two.
+
+    Parameters
+    ----------
+    z : ndarray of shape (N,), real
+        Values along the line. Non-finite values are invalid and separate runs.
+    eps : float
+        Largest residual that a segment may keep, in the unit of `z`, >= 0.
+    pixelSize : float or ndarray of shape (N,)
+        Spacing of the samples, or their abscissae; a run ends where these do not increase.
+
+    Returns
+    -------
+    segments : ndarray of shape (S, 2), CV_32S
+        First and last index of every segment, in order. Segments of up to three samples fit exactly.
+
+    Raises
+    ------
+    rangeedge.error
+        On a bad argument.
+
+    Notes
+    -----
+    Jiang and Bunke, section 4.1 and Fig. 3, after Duda and Hart.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> splitScanLine(np.array([0, 1, 2, 3, 4, 4, 4, 4, 4.0]), 0.1).tolist()
+    [[0, 4], [5, 8]]
+    """
+    func = "splitScanLine"
+    z = array(func, "z", z, "a real array of shape (N,)", ndim=(1,))
+    eps = number(func, "eps", eps, 0)
+    y = _line(z, np.float64 if z.dtype.itemsize > 4 or z.dtype.kind != "f" else np.float32)
+    if np.ndim(pixelSize) == 0:
+        x = None
+        number(func, "pixelSize", pixelSize, 0, above=True)
+    else:
+        pixelSize = array(func, "pixelSize", pixelSize, "a length or an array like `z`", ndim=(1,))
+        if pixelSize.shape != z.shape:
+            raise fail(func, "pixelSize", f"a length or an array of shape {z.shape}", described(pixelSize))
+        x = _line(pixelSize, y.dtype)
+        y[np.isnan(x)] = np.nan
+    return _core.split_scan_line(y, x, eps)
+
+
+def _line(values: np.ndarray, dtype: Any) -> np.ndarray:
+    line = values.astype(dtype)
+    line[~np.isfinite(line)] = np.nan
+    return line
+
+
+@takes_scan_line_params
+def edgeStrength(
+    src: np.ndarray, eps: float | None = None, *, mask: np.ndarray | None = None, **options: Any
+) -> EdgeStrength:
+    """Measure how strong an edge every pixel of a range image is, and of which kind.
+
+    edgeStrength(src[, eps[, mask[, K[, ...]]]]) -> jump, crease, kind, significance
+
+    Rows, columns and both diagonals are approximated by curves (P§4.1). At a cut between two of them, f1 and f2,
+
+        jump = |z1(x) - z2(x)|,  crease = the angle between the normals of f1 and f2 at x,
+
+    x being the position of the edge; it is their intersection where the pixels allow that, and then jump = 0
+    (P§4.2). Both pixels beside the cut receive the strengths, and of several candidates the largest.
+
+    Parameters
+    ----------
+    src : ndarray
+        (H, W) depth, or points (H, W, 3) or (H, W, 4) in the camera frame (x right, y down, z away).
+        Integers are divided by `depthFactor` and invalid where <= 0. With `K`, depths that are not positive and
+        finite are invalid; without it, only non-finite values are. A point is invalid if a coordinate is not finite.
+    eps : float, optional
+        Splitting tolerance as a length; None derives it from the noise.
+    mask : ndarray of shape (H, W), 8-bit or bool, optional
+        Non-zero where pixels are used.
+    K, pixelSize, heightMap, depthFactor, noise, directions, fit, measure, crease, maxShift, maxGap, ...
+        As in `ScanLineParams`, which holds the defaults.
+
+    Returns
+    -------
+    jump : ndarray of shape (H, W), CV_32F
+        Depth step in the unit of the image, 0 where there is no candidate.
+    crease : ndarray of shape (H, W), CV_32F
+        Angle in degrees, 0 where there is no candidate.
+    kind : ndarray of shape (H, W), CV_8U
+        EDGE_JUMP where the step exceeds the noise, with EDGE_OCCLUDING on its nearer side and EDGE_OCCLUDED on its
+        farther one; EDGE_CONVEX or EDGE_CONCAVE of the largest crease; EDGE_BOUNDARY beside invalid pixels, whether
+        there is an edge or not.
+    significance : ndarray of shape (H, W), CV_32F
+        Strength over its standard deviation, joined with that of neighbouring candidates of the same kind.
+
+    Raises
+    ------
+    rangeedge.error
+        On a bad argument.
+
+    See Also
+    --------
+    edgePoints : The candidates themselves, with subpixel positions.
+    detectEdges : A thin edge map in one call.
+
+    Notes
+    -----
+    Jiang and Bunke, sections 4.1 and 4.2. The result does not depend on the number of threads.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> z = np.where(np.arange(40) < 20, 1.0, 1.25) * np.ones((30, 1))
+    >>> s = edgeStrength(z, noise=0.001)
+    >>> float(s.jump[15, 19]), float(s.jump[15, 20]), float(s.jump[15, 21])
+    (0.25, 0.25, 0.0)
+    >>> bool(s.kind[15, 19] & EDGE_OCCLUDING), bool(s.kind[15, 20] & EDGE_OCCLUDED)
+    (True, True)
+    """
+    params = params_of("edgeStrength", eps, options)
+    return strength_of("edgeStrength", frame_of("edgeStrength", src, params, mask), params)
+
+
+@takes_scan_line_params
+def edgePoints(
+    src: np.ndarray, eps: float | None = None, *, mask: np.ndarray | None = None, **options: Any
+) -> np.ndarray:
+    """Find the edge candidates of every scan line, with subpixel positions.
+
+    edgePoints(src[, eps[, mask[, K[, ...]]]]) -> points
+
+    Parameters
+    ----------
+    src, eps, mask, K, ...
+        As in `edgeStrength`.
+
+    Returns
+    -------
+    points : structured ndarray of shape (N,)
+        x, y (pixels, subpixel), jump (length), crease (degrees), kind (EDGE_* bits), significance, direction
+        (a DIR_* bit). An edge that several scan lines cross gives several points. In `kind`, EDGE_OCCLUDING says that
+        the surface before the point along its scan line (left of it, or above on a column) is the nearer one,
+        EDGE_OCCLUDED that it is the farther one.
+
+    Raises
+    ------
+    rangeedge.error
+        On a bad argument.
+
+    Notes
+    -----
+    Jiang and Bunke, section 4.2 and Fig. 5. The order is by direction, then by line, then along the line.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> roof = np.abs(np.arange(41) - 20.3) * np.ones((5, 1))
+    >>> points = edgePoints(roof, noise=0.001, directions=1)
+    >>> len(points), points["x"].round(3).tolist()
+    (5, [20.3, 20.3, 20.3, 20.3, 20.3])
+    """
+    params = params_of("edgePoints", eps, options)
+    return points_of("edgePoints", frame_of("edgePoints", src, params, mask), params)
+
+
+def frame_of(func: str, src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None) -> RangeFrame:
+    """The range image in the form that kernels take."""
+    return range_frame(func, src, params.K, params.pixelSize, params.heightMap, params.depthFactor, mask)
+
+
+def strength_of(func: str, frame: RangeFrame, params: ScanLineParams) -> EdgeStrength:
+    """Edge strengths of a checked range image."""
+    strength = EdgeStrength(
+        np.empty(frame.shape, np.float32),
+        np.empty(frame.shape, np.float32),
+        np.empty(frame.shape, np.uint8),
+        np.empty(frame.shape, np.float32),
+    )
+    noise = kernel_noise(func, params.noise, frame)
+    _core.edge_strength(*frame.kernel_args, *noise, _kernel_parameters(params, frame), *strength)
+    strength.kind[frame.boundary > 0] |= EDGE_BOUNDARY
+    return strength
+
+
+_POINT = [("x", "f4"), ("y", "f4"), ("jump", "f4"), ("crease", "f4")]
+_POINT += [("kind", "u1"), ("significance", "f4"), ("direction", "u1")]
+
+
+def points_of(func: str, frame: RangeFrame, params: ScanLineParams) -> np.ndarray:
+    """Edge points of a checked range image."""
+    noise = kernel_noise(func, params.noise, frame)
+    candidates = _core.edge_candidates(*frame.kernel_args, *noise, _kernel_parameters(params, frame))
+    points = np.empty(len(candidates["x"]), dtype=_POINT)
+    for name in points.dtype.names:
+        points[name] = candidates[name]
+    return points
+
+
+def _kernel_parameters(params: ScanLineParams, frame: RangeFrame) -> _core.Parameters:
+    return _core.Parameters(
+        eps=params.eps or 0.0,
+        eps_factor=params.epsFactor,
+        directions=params.directions,
+        interpolate=params.fit == FIT_INTERP,
+        endpoint=params.measure == MEASURE_ENDPOINT,
+        normals=params.crease == CREASE_NORMAL,
+        max_shift=params.maxShift,
+        max_gap=params.maxGap,
+        max_fillet=params.maxFillet,
+        margin=params.margin,
+        merge_significance=params.mergeSignificance,
+        min_significance=params.minSignificance,
+        threads=cv2.getNumThreads() if frame.shape[0] * frame.shape[1] >= _THREAD_PIXELS else 1,
+    )

@@ -6,6 +6,7 @@
 
 #include <array>
 #include <optional>
+#include <type_traits>
 
 #include "edges.hpp"
 #include "scanline.hpp"
@@ -21,12 +22,33 @@ using In = nb::ndarray<const T, nb::c_contig, nb::device::cpu>;
 template <class T>
 using Out = nb::ndarray<T, nb::c_contig, nb::device::cpu>;
 
-// Hands a vector to NumPy without a copy; `row` elements a row.
+// Hands a vector to NumPy without a copy; elements that hold several T become rows.
 template <class T, class E>
 nb::ndarray<nb::numpy, T> handed_over(std::vector<E>&& values) {
     auto* owner = new std::vector<E>(std::move(values));
     nb::capsule capsule(owner, [](void* p) noexcept { delete static_cast<std::vector<E>*>(p); });
-    return nb::ndarray<nb::numpy, T>(owner->data(), {owner->size(), sizeof(E) / sizeof(T)}, capsule);
+    if constexpr (std::is_same_v<T, E>) return nb::ndarray<nb::numpy, T>(owner->data(), {owner->size()}, capsule);
+    else return nb::ndarray<nb::numpy, T>(owner->data(), {owner->size(), sizeof(E) / sizeof(T)}, capsule);
+}
+
+// One array a field, by the field's name.
+nb::dict columns(const std::vector<Candidate>& candidates) {
+    nb::dict result;
+    const auto add = [&](const char* name, auto field) {
+        using E = std::decay_t<decltype(candidates[0].*field)>;
+        std::vector<E> values;
+        values.reserve(candidates.size());
+        for (const Candidate& c : candidates) values.push_back(c.*field);
+        result[name] = handed_over<E>(std::move(values));
+    };
+    add("x", &Candidate::x);
+    add("y", &Candidate::y);
+    add("jump", &Candidate::jump);
+    add("crease", &Candidate::crease);
+    add("kind", &Candidate::kind);
+    add("significance", &Candidate::significance);
+    add("direction", &Candidate::direction);
+    return result;
 }
 
 template <class T>
@@ -57,10 +79,10 @@ RangeImage<T> range_image(const In<T>& src, bool projective, const std::array<do
     return image;
 }
 
-using NoiseArgs = std::array<double, 3>;
+using NoiseArgs = std::array<double, 4>;
 
 Noise noise_model(const NoiseArgs& abc, const std::optional<In<float>>& map) {
-    return {abc[0], abc[1], abc[2], map ? map->data() : nullptr};
+    return {abc[0], abc[1], abc[2], abc[3], map ? map->data() : nullptr};
 }
 
 template <class T>
@@ -75,7 +97,7 @@ void define(nb::module_& m) {
                 nb::gil_scoped_release release;
                 candidates = detect(range_image(src, projective, to_plane, axis), noise_model(noise, noise_map), parameters);
             }
-            return handed_over<std::uint8_t>(std::move(candidates));
+            return columns(candidates);
         },
         "src"_a.noconvert(), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a, "noise_map"_a.noconvert().none(), "parameters"_a);
     m.def(
@@ -85,7 +107,7 @@ void define(nb::module_& m) {
            Out<std::uint8_t> kind, Out<float> significance) {
             nb::gil_scoped_release release;
             const auto candidates = detect(range_image(src, projective, to_plane, axis), noise_model(noise, noise_map), parameters);
-            combine_maximum(candidates, static_cast<std::int64_t>(jump.size()), jump.data(), crease.data(), kind.data(),
+            combine(candidates, static_cast<std::int64_t>(jump.size()), jump.data(), crease.data(), kind.data(),
                             significance.data());
         },
         "src"_a.noconvert(), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a, "noise_map"_a.noconvert().none(), "parameters"_a,
@@ -98,12 +120,14 @@ void bind_edges(nb::module_& m) {
     nb::class_<Parameters>(m, "Parameters")
         .def(
             "__init__",
-            [](Parameters* self, double eps, double eps_factor, int directions, bool interpolate, bool endpoint,
-               double max_shift, int max_gap, double min_significance, int threads) {
-                new (self) Parameters{eps, eps_factor, directions, interpolate, endpoint, max_shift, max_gap, min_significance, threads};
+            [](Parameters* self, double eps, double eps_factor, int directions, bool interpolate, bool endpoint, bool normals,
+               double max_shift, int max_gap, int max_fillet, int margin, double merge_significance, double min_significance,
+               int threads) {
+                new (self) Parameters{eps,     eps_factor, directions, interpolate,        endpoint,         normals, max_shift,
+                                      max_gap, max_fillet, margin,     merge_significance, min_significance, threads};
             },
-            nb::kw_only(), "eps"_a, "eps_factor"_a, "directions"_a, "interpolate"_a, "endpoint"_a, "max_shift"_a, "max_gap"_a,
-            "min_significance"_a, "threads"_a);
+            nb::kw_only(), "eps"_a, "eps_factor"_a, "directions"_a, "interpolate"_a, "endpoint"_a, "normals"_a, "max_shift"_a,
+            "max_gap"_a, "max_fillet"_a, "margin"_a, "merge_significance"_a, "min_significance"_a, "threads"_a);
     define<float>(m);
     define<double>(m);
 }

@@ -21,30 +21,50 @@ struct RangeImage {
 // Standard deviation of a length z: a + b z + c z^2, or given for every pixel.
 struct Noise {
     double a, b, c;
-    const float* map;  // (rows, cols) or null
+    double correlation;  // how much larger it is over a segment than between neighbours
+    const float* map;    // (rows, cols) or null
 };
 
+// Lengths are in the unit of the image, reaches in samples, significances in standard deviations.
 struct Parameters {
-    double eps;               // tolerance as a length; 0: `eps_factor` times the noise
+    double eps;                 // tolerance as a length; 0: `eps_factor` times the noise
     double eps_factor;
-    int directions;
-    bool interpolate;         // FIT_INTERP
-    bool endpoint;            // MEASURE_ENDPOINT
-    double max_shift;         // samples
-    int max_gap;              // samples
-    double min_significance;
+    int directions;             // bits
+    bool interpolate;           // curves through end points and midpoint instead of least squares
+    bool endpoint;              // strengths extrapolated from either end point
+    bool normals;               // crease angles between surface normals
+    double max_shift;           // between the cut and the adapted position
+    int max_gap;                // between the ends of two runs that are compared
+    int max_fillet;             // longest segment that may be a rounded edge
+    int margin;                 // samples beside a cut that the fit leaves out
+    double merge_significance;  // below it a cut is taken back
+    double min_significance;    // below it a candidate is dropped
     int threads;
 };
 
-// One cut of one scan line. Pixels are linear indices; slopes are per unit of the plane's abscissa.
+// Bits of Candidate::kind.
+enum Kind : std::uint8_t {
+    jump_bit = 1,
+    convex_bit = 2,
+    concave_bit = 4,
+    occluding_bit = 8,  // of a candidate: the surface before the cut is the nearer one
+    occluded_bit = 16,
+};
+
+// One side of a cut: the curve's ordinate there, its slope per unit of the plane and the slope's variance.
+struct Side {
+    float value, slope, slope_variance;
+};
+
+// One cut of one scan line.
 struct Candidate {
-    float x, y;
-    float jump, crease;
-    float significance;
-    std::uint8_t kind, direction, unused[2];
-    std::int32_t before, after;
-    float value_before, value_after, slope_before, slope_after;
-    float slope_variance_before, slope_variance_after;
+    float x, y;                  // position in pixels
+    float jump, crease;          // length, degrees
+    float significance;          // joined with that of its neighbours
+    std::uint8_t kind, direction;
+    std::int32_t before, after;  // linear indices of the pixels on either side
+    Side sides[2];
+    float place[2], along[2];    // position and direction of the line in the plane of the image
 };
 
 // All candidates, direction by direction, line by line; the same for any number of threads.
@@ -52,7 +72,7 @@ template <class T>
 std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters);
 
 // Largest strengths per pixel; the kind of a crease comes with its largest angle. The outputs have `size` pixels.
-void combine_maximum(const std::vector<Candidate>& candidates, std::int64_t size, float* jump, float* crease,
-                     std::uint8_t* kind, float* significance);
+void combine(const std::vector<Candidate>& candidates, std::int64_t size, float* jump, float* crease,
+             std::uint8_t* kind, float* significance);
 
 }  // namespace rangeedge

@@ -30,7 +30,18 @@ struct Moments {
         m.y2 = y2 + 2 * d * y1 + d2 * y0;
         return m;
     }
-    // Joins the samples of another segment, counted from the same base.
+    // The same sums, with y counted from another base.
+    Moments rebased(double to) const {
+        const double d = base - to;
+        Moments m = *this;
+        m.base = to;
+        m.y0 = y0 + d * n;
+        m.y1 = y1 + d * x1;
+        m.y2 = y2 + d * x2;
+        m.yy = yy + 2 * d * y0 + d * d * n;
+        return m;
+    }
+    // Adds the sums of other samples, counted from the same base.
     Moments& operator+=(const Moments& other) {
         const Moments o = other.moved(origin);
         n += o.n, x1 += o.x1, x2 += o.x2, x3 += o.x3, x4 += o.x4;
@@ -38,6 +49,13 @@ struct Moments {
         return *this;
     }
 };
+
+// The sums over both segments, counted from their common mean.
+inline Moments joined(const Moments& a, const Moments& b) {
+    Moments sum = a;
+    sum += b.rebased(a.base);
+    return sum.moved(sum.origin + sum.x1 / sum.n);
+}
 
 // f(x) = c0 + c1 p1 + c2 p2 in the polynomials p1 = x - mean and p2 = p1^2 - alpha p1 - beta, which are orthogonal
 // over the samples. A line has c2 = 0 and norm2 = 0; a single sample has c1 = 0 and norm1 = 0 as well.

@@ -46,48 +46,53 @@ Path line_path(int direction, int i, int rows, int cols) {
 }
 
 template <class T>
-bool LineReader<T>::constant_tolerance() const {
-    if (parameters_.eps > 0) return !image_.projective;
-    if (noise_.map) return false;
-    return image_.projective ? noise_.a <= 0 && noise_.b <= 0 : noise_.b <= 0 && noise_.c <= 0;
-}
-
-template <class T>
-double LineReader<T>::tolerance(double ordinate, std::int64_t pixel) const {
-    if (parameters_.eps > 0) return image_.projective ? parameters_.eps * ordinate * ordinate : parameters_.eps;
-    return parameters_.eps_factor * sigma(ordinate, pixel);
-}
-
-template <class T>
 void LineReader<T>::read(const Path& path, Line<T>& line) const {
-    const auto n = static_cast<std::size_t>(path.size);
     line.path = path;
+    line.cols = image_.cols;
     line.projective = image_.projective;
     line.irregular = image_.points != nullptr;
-    line.y.resize(n);
-    line.start = 0, line.step = 1, line.kappa = 1;
-    if (line.irregular) {
+    line.noise = noise_;
+    line.y.resize(static_cast<std::size_t>(path.size));
+    if (line.irregular)
         read_points(line);
-    } else {
-        const std::int64_t stride = static_cast<std::int64_t>(path.drow) * image_.cols + path.dcol;
-        const T* source = image_.ordinate + path.pixel(0, image_.cols);
-        for (std::size_t k = 0; k < n; ++k) line.y[k] = source[static_cast<std::int64_t>(k) * stride];
-        // The line's direction e and the place of its first pixel, in the plane of the image.
-        const double* p = image_.to_plane;
-        const double du = p[0] * path.dcol + p[1] * path.drow, dv = p[3] * path.dcol + p[4] * path.drow;
-        const double u = p[0] * path.col + p[1] * path.row + p[2], v = p[3] * path.col + p[4] * path.row + p[5];
-        line.step = std::hypot(du, dv);
-        line.start = (u * du + v * dv) / line.step;
-        const double offset = (u * dv - v * du) / line.step;
-        line.kappa = std::sqrt(1 + offset * offset);
-    }
-    line.scaled = !constant_tolerance();
+    else
+        read_grid(line);
+    set_tolerance(line);
+}
+
+template <class T>
+void LineReader<T>::read_grid(Line<T>& line) const {
+    const Path& path = line.path;
+    const std::int64_t stride = static_cast<std::int64_t>(path.drow) * image_.cols + path.dcol;
+    const T* source = image_.ordinate + path.pixel(0, image_.cols);
+    for (std::size_t k = 0; k < line.y.size(); ++k) line.y[k] = source[static_cast<std::int64_t>(k) * stride];
+    // The line's direction and the place of its first pixel, in the plane of the image.
+    const double* p = image_.to_plane;
+    const double du = p[0] * path.dcol + p[1] * path.drow, dv = p[3] * path.dcol + p[4] * path.drow;
+    const double u = p[0] * path.col + p[1] * path.row + p[2], v = p[3] * path.col + p[4] * path.row + p[5];
+    line.step = std::hypot(du, dv);
+    line.along[0] = du / line.step, line.along[1] = dv / line.step;
+    line.start = u * line.along[0] + v * line.along[1];
+    line.across = v * line.along[0] - u * line.along[1];
+    line.kappa = std::sqrt(1 + line.across * line.across);
+}
+
+template <class T>
+void LineReader<T>::set_tolerance(Line<T>& line) const {
+    const Noise& n = noise_.noise;
+    const bool given = parameters_.eps > 0;
+    // One tolerance for the whole line: a length on a grid, or a noise that does not change with the ordinate.
+    line.scaled = given ? image_.projective : n.map || n.b > 0 || (image_.projective ? n.a > 0 : n.c > 0);
+    const auto tolerance = [&](double ordinate, std::int64_t pixel) {
+        if (!given) return parameters_.eps_factor * noise_.sigma(ordinate, pixel);
+        return std::max(parameters_.eps * (image_.projective ? ordinate * ordinate : 1), 1e-30);
+    };
     line.tolerance = line.scaled ? 1 : tolerance(1, 0);
     if (!line.scaled) return;
-    line.scale.resize(n);
-    for (std::size_t k = 0; k < n; ++k)
-        line.scale[k] = static_cast<T>(
-            1 / std::max(tolerance(line.ordinate(static_cast<int>(k)), path.pixel(static_cast<int>(k), image_.cols)), 1e-30));
+    line.scale.resize(line.y.size());
+    for (int k = 0; k < line.path.size; ++k)
+        line.scale[static_cast<std::size_t>(k)] =
+            static_cast<T>(1 / tolerance(line.ordinate(k), line.path.pixel(k, image_.cols)));
 }
 
 // The plane of a line of points holds its first and last point and the viewpoint (projective) or the viewing axis.
@@ -99,6 +104,7 @@ void LineReader<T>::read_points(Line<T>& line) const {
         return Vector{static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
     };
     const auto valid = [](const Vector& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); };
+    line.start = 0, line.step = 1, line.kappa = 1;
     line.x.resize(line.y.size());
     std::fill(line.y.begin(), line.y.end(), nan<T>);
     std::fill(line.x.begin(), line.x.end(), nan<T>);
@@ -112,14 +118,14 @@ void LineReader<T>::read_points(Line<T>& line) const {
     Vector normal = image_.projective ? cross(a, b) : cross(axis, combination(b, -1, a));
     if (!normalise(normal)) return;
     Vector away = combination(axis, -dot(axis, normal), normal);  // the axis within the plane
-    line.kappa = std::sqrt(dot(away, away));
+    line.kappa = std::sqrt(dot(away, away));  // of the axis along `away`, the inverse until below
     if (!normalise(away)) return;
     // Across the viewing direction, the way the samples run.
     Vector along = cross(normal, away);
     const double turn = image_.projective ? dot(b, along) * dot(a, away) - dot(a, along) * dot(b, away)
                                           : dot(combination(b, -1, a), along);
     if (turn < 0) along = {-along.x, -along.y, -along.z};
-    const double inverse_kappa = line.kappa > 0 ? 1 / line.kappa : 1;
+    line.kappa = 1 / line.kappa;
     for (int k = first; k <= last; ++k) {
         const Vector p = point(k);
         if (!valid(p)) continue;
@@ -129,13 +135,20 @@ void LineReader<T>::read_points(Line<T>& line) const {
             line.x[i] = static_cast<T>(dot(p, along));
             line.y[i] = static_cast<T>(-r);
         } else if (r > 0) {
-            // r = kappa' z along the axis: the plane's inverse depth is counted along the axis, as with a camera.
-            const double z = r * line.kappa;
+            const double z = r / line.kappa;  // along the axis, as with a camera
             line.x[i] = static_cast<T>(dot(p, along) / z);
             line.y[i] = static_cast<T>(1 / z);
         }
     }
-    line.kappa = inverse_kappa;
+    // In the plane of the image, of which the axis is the normal.
+    Vector right{1, 0, 0};
+    right = combination(right, -dot(axis, right), axis);
+    if (!normalise(right)) right = {0, 1, 0};
+    const Vector down = cross(axis, right);
+    line.along[0] = dot(along, right), line.along[1] = dot(along, down);
+    const Vector& p = a;
+    const double scale = image_.projective ? 1 / dot(p, axis) : 1;
+    line.across = scale * (dot(p, down) * line.along[0] - dot(p, right) * line.along[1]);
 }
 
 template class LineReader<float>;

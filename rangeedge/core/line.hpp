@@ -1,10 +1,10 @@
 // Scan lines of a range image as plane curves: rows, columns and both diagonals.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "edges.hpp"
@@ -23,21 +23,39 @@ struct Path {
 int line_count(int direction, int rows, int cols);
 Path line_path(int direction, int i, int rows, int cols);
 
+// Standard deviations of ordinates.
+struct OrdinateNoise {
+    Noise noise;
+    bool projective;
+    double sigma(double ordinate, std::int64_t pixel) const {
+        const double z = projective ? 1 / ordinate : std::abs(ordinate);
+        const double length =
+            noise.correlation * (noise.map ? static_cast<double>(noise.map[pixel]) : noise.a + (noise.b + noise.c * z) * z);
+        return std::max(projective ? length * ordinate * ordinate : length, 1e-30);
+    }
+};
+
 // A scan line in its plane. The abscissa of sample k is x[k] where given, else k; w = start + step * abscissa is its
 // place on the line (a normalised image coordinate where projective, else a length).
 template <class T>
 struct Line {
     Path path{};
-    std::vector<T> y, x, scale;
-    bool irregular = false, scaled = false;
-    bool projective = false;
+    int cols = 0;
+    std::vector<T> y, x, scale;  // scale: inverse tolerances, where they differ
+    bool irregular = false, scaled = false, projective = false;
     double start = 0, step = 1;
-    double kappa = 1;   // in the plane, a point of inverse depth q lies at (w / q, kappa / q)
+    double kappa = 1;  // in the plane, a point of inverse depth q lies at (w / q, kappa / q)
+    double along[2] = {1, 0}, across = 0;  // the line in the plane of the image: direction, and distance from the origin
     double tolerance = 1;
+    OrdinateNoise noise{};
 
     double abscissa(int k) const { return irregular ? static_cast<double>(x[static_cast<std::size_t>(k)]) : k; }
     double ordinate(int k) const { return static_cast<double>(y[static_cast<std::size_t>(k)]); }
     double depth(double ordinate) const { return projective ? 1 / ordinate : -ordinate; }
+    double sigma_at(int k) const { return noise.sigma(ordinate(k), path.pixel(k, cols)); }
+    double tolerance_at(int k) const {
+        return scaled ? 1 / static_cast<double>(scale[static_cast<std::size_t>(k)]) : tolerance;
+    }
 
     // The tangent (s, r) of a curve, without its positive factor; r grows away from the viewer.
     struct Tangent {
@@ -54,28 +72,22 @@ struct Line {
     }
 };
 
+// Reads the lines of one image.
 template <class T>
 class LineReader {
 public:
     LineReader(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters)
-        : image_(image), noise_(noise), parameters_(parameters) {}
+        : image_(image), noise_{noise, image.projective}, parameters_(parameters) {}
 
     void read(const Path& path, Line<T>& line) const;
 
-    // Standard deviation of an ordinate.
-    double sigma(double ordinate, std::int64_t pixel) const {
-        const double z = image_.projective ? 1 / ordinate : std::abs(ordinate);
-        const double length = noise_.map ? static_cast<double>(noise_.map[pixel]) : noise_.a + (noise_.b + noise_.c * z) * z;
-        return image_.projective ? length * ordinate * ordinate : length;
-    }
-
 private:
-    bool constant_tolerance() const;
-    double tolerance(double ordinate, std::int64_t pixel) const;
+    void read_grid(Line<T>& line) const;
     void read_points(Line<T>& line) const;
+    void set_tolerance(Line<T>& line) const;
 
     RangeImage<T> image_;
-    Noise noise_;
+    OrdinateNoise noise_;
     Parameters parameters_;
 };
 

@@ -1,0 +1,189 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "approximation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace rangeedge {
+namespace {
+
+constexpr double curved_significance = 5;  // of the quadratic term of a least-squares fit
+constexpr int margin_keeps = 8;            // samples that a fit keeps whatever the margin
+constexpr double fillet_tolerance = 1.5;   // residuals of a rounded edge, in tolerances
+
+template <class T>
+class Approximator {
+public:
+    Approximator(const Line<T>& line, const Parameters& parameters, Approximation& result)
+        : line_(line), parameters_(parameters), r_(result) {}
+
+    void split() {
+        const T* x = line_.irregular ? line_.x.data() : nullptr;
+        const T* scale = line_.scaled ? line_.scale.data() : nullptr;
+        r_.segments.clear();
+        for_each_run(line_.y.data(), x, line_.path.size, [&](int first, int last) {
+            split_run(Run<T>{line_.y.data(), x, scale, first, last}, static_cast<T>(line_.tolerance), r_.pending,
+                      r_.segments);
+        });
+    }
+
+    void interpolate() {
+        r_.curves.clear();
+        for (const Segment& s : r_.segments) {
+            const int middle = s.first + (s.last - s.first) / 2;
+            Moments moments = empty_moments(middle);
+            int added = s.first - 1;
+            for (const int k : {s.first, middle, s.last}) {
+                if (k > added) add(moments, k);
+                added = k;
+            }
+            r_.curves.push_back(fit_interpolating(moments));
+        }
+    }
+
+    void fit() {
+        r_.curves.clear();
+        r_.moments.clear();
+        for (const Segment& s : r_.segments) {
+            Moments moments = empty_moments(s.first + (s.last - s.first) / 2);
+            for (int k = s.first; k <= s.last; ++k) add(moments, k);
+            r_.moments.push_back(moments);
+            r_.curves.push_back(fit_least_squares(moments, sigma(s), curved_significance));
+        }
+    }
+
+    // Takes back cuts, the least significant first, until each one left lowers the sum of squares enough.
+    void merge() {
+        const double limit = parameters_.merge_significance * parameters_.merge_significance;
+        if (r_.segments.size() < 2 || !(limit > 0)) return;
+        r_.costs.resize(r_.segments.size() - 1);
+        for (std::size_t i = 0; i < r_.costs.size(); ++i) r_.costs[i] = cost_of_merging(i);
+        while (!r_.costs.empty()) {
+            const auto least = std::min_element(r_.costs.begin(), r_.costs.end());
+            if (!(*least < limit)) break;
+            const auto i = static_cast<std::size_t>(least - r_.costs.begin());
+            r_.moments[i] = joined(r_.moments[i], r_.moments[i + 1]);
+            r_.segments[i].last = r_.segments[i + 1].last;
+            r_.curves[i] = fit_least_squares(r_.moments[i], sigma(r_.segments[i]), curved_significance);
+            erase(i + 1);
+            r_.costs.erase(least);
+            if (i < r_.costs.size()) r_.costs[i] = cost_of_merging(i);
+            if (i > 0) r_.costs[i - 1] = cost_of_merging(i - 1);
+        }
+    }
+
+    // Samples beside a cut may see both surfaces: the fit of a long segment leaves them out.
+    void leave_out_margins() {
+        for (std::size_t i = 0; i < r_.segments.size(); ++i) {
+            const Segment& s = r_.segments[i];
+            const int margin = std::min(parameters_.margin, (s.size() - margin_keeps) / 2);
+            if (margin <= 0) continue;
+            for (int d = 0; d < margin; ++d) {
+                add(r_.moments[i], s.first + d, -1);
+                add(r_.moments[i], s.last - d, -1);
+            }
+            r_.curves[i] = fit_least_squares(r_.moments[i], sigma(s), curved_significance);
+        }
+    }
+
+    // A short segment between two longer ones whose curves meet there is the rounding of one edge, or a sliver that
+    // splitting left: its samples go to the curve on their side of the meeting.
+    void dissolve_fillets() {
+        for (std::size_t i = 1; i + 1 < r_.segments.size();) {
+            const int cut = fillet_cut(i);
+            if (cut < r_.segments[i].first - 1) {
+                ++i;
+                continue;
+            }
+            r_.segments[i - 1].last = cut;
+            r_.segments[i + 1].first = cut + 1;
+            erase(i);
+        }
+    }
+
+private:
+    Moments empty_moments(int k) const {
+        Moments moments;
+        moments.origin = line_.abscissa(k);
+        moments.base = line_.ordinate(k);
+        return moments;
+    }
+    void add(Moments& moments, int k, double sign = 1) const { moments.add(line_.abscissa(k), line_.ordinate(k), sign); }
+
+    double sigma(const Segment& s) const { return line_.sigma_at(s.first + s.size() / 2); }
+
+    void erase(std::size_t i) {
+        const auto at = static_cast<std::ptrdiff_t>(i);
+        r_.segments.erase(r_.segments.begin() + at);
+        r_.curves.erase(r_.curves.begin() + at);
+        r_.moments.erase(r_.moments.begin() + at);
+    }
+
+    bool adjacent(std::size_t i) const {
+        const int last = r_.segments[i].last;
+        return last + 1 == r_.segments[i + 1].first && line_.abscissa(last) < line_.abscissa(last + 1);
+    }
+
+    double cost_of_merging(std::size_t i) const {
+        if (!adjacent(i)) return HUGE_VAL;
+        const double s = line_.sigma_at(r_.segments[i].last);
+        const Curve one = fit_least_squares(joined(r_.moments[i], r_.moments[i + 1]), s, curved_significance);
+        return (one.sum_squares - r_.curves[i].sum_squares - r_.curves[i + 1].sum_squares) / (s * s);
+    }
+
+    // The sample before the meeting that makes segment i a fillet; less than `first - 1` where it is none.
+    int fillet_cut(std::size_t i) const {
+        const Segment& s = r_.segments[i];
+        const int none = s.first - 2;
+        if (s.size() > parameters_.max_fillet || !adjacent(i - 1) || !adjacent(i)) return none;
+        if (s.size() > std::min(r_.segments[i - 1].size(), r_.segments[i + 1].size())) return none;
+        const Curve &f = r_.curves[i - 1], &g = r_.curves[i + 1];
+        double x = 0;
+        if (!intersection(f, g, (line_.abscissa(s.first) + line_.abscissa(s.last)) / 2, x)) return none;
+        if (x < line_.abscissa(s.first - 1) || x > line_.abscissa(s.last + 1)) return none;
+        int cut = s.first - 1;
+        for (int k = s.first; k <= s.last; ++k) {
+            const double at = line_.abscissa(k);
+            if (at <= x) cut = k;
+            const double residual = std::abs(line_.ordinate(k) - (at <= x ? f : g).value(at));
+            if (!(residual <= fillet_tolerance * line_.tolerance_at(k))) return none;
+        }
+        return cut;
+    }
+
+    const Line<T>& line_;
+    const Parameters& parameters_;
+    Approximation& r_;
+};
+
+}  // namespace
+
+bool intersection(const Curve& f, const Curve& g, double near, double& x) {
+    // f - g = c + b t + a t^2 with t = x - near; the root of smaller magnitude, without cancellation.
+    const double c = f.value(near) - g.value(near), b = f.slope(near) - g.slope(near), a = f.c2 - g.c2;
+    const double discriminant = b * b - 4 * a * c;
+    if (!(discriminant >= 0)) return false;
+    const double denominator = std::abs(b) + std::sqrt(discriminant);
+    if (!(denominator > 0)) return false;
+    x = near - (b < 0 ? -2 : 2) * c / denominator;
+    return std::isfinite(x);
+}
+
+template <class T>
+void approximate(const Line<T>& line, const Parameters& parameters, Approximation& result) {
+    Approximator<T> approximator(line, parameters, result);
+    approximator.split();
+    if (parameters.interpolate) {
+        approximator.interpolate();
+        return;
+    }
+    approximator.fit();
+    approximator.merge();
+    approximator.leave_out_margins();
+    approximator.dissolve_fillets();
+}
+
+template void approximate(const Line<float>&, const Parameters&, Approximation&);
+template void approximate(const Line<double>&, const Parameters&, Approximation&);
+
+}  // namespace rangeedge

@@ -1,0 +1,29 @@
+// A scan line as a sequence of segments, each with its curve.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <vector>
+
+#include "fit.hpp"
+#include "line.hpp"
+#include "scanline.hpp"
+
+namespace rangeedge {
+
+// The approximation of one line, and the scratch that making it needs; reused from line to line.
+struct Approximation {
+    std::vector<Segment> segments;
+    std::vector<Curve> curves;
+    std::vector<Moments> moments;
+    std::vector<Segment> pending;
+    std::vector<double> costs;
+};
+
+// Splits the line (section 4.1), fits a curve to every segment (4.2, end), takes back cuts that the noise explains,
+// and gives the rounding of an edge to the surfaces it joins.
+template <class T>
+void approximate(const Line<T>& line, const Parameters& parameters, Approximation& result);
+
+// Where f and g meet, the place nearest `near`; false where they do not.
+bool intersection(const Curve& f, const Curve& g, double near, double& x);
+
+}  // namespace rangeedge

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "neighbours.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "parallel.hpp"
+
+namespace rangeedge {
+namespace {
+
+constexpr double degrees = 57.295779513082320877;
+constexpr int reach = 3;               // pixels, in either axis
+constexpr float spread = 1.5f;         // pixels: standard deviation of the weight of a neighbour
+constexpr float capped = 8;            // a single candidate's share of the evidence
+constexpr int kinds = jump_bit | convex_bit | concave_bit;
+
+struct Vector {
+    double x, y, z;
+};
+
+// Candidates by pixel: those of pixel p are items[start[p]] .. items[start[p + 1] - 1].
+class Grid {
+public:
+    Grid(const std::vector<Candidate>& candidates, int rows, int cols)
+        : candidates_(candidates), rows_(rows), cols_(cols), start_(static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols) + 1, 0),
+          items_(candidates.size()) {
+        for (const Candidate& c : candidates) ++start_[cell(c) + 1];
+        for (std::size_t p = 1; p < start_.size(); ++p) start_[p] += start_[p - 1];
+        std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
+        for (std::size_t i = 0; i < candidates.size(); ++i)
+            items_[static_cast<std::size_t>(next[cell(candidates[i])]++)] = static_cast<std::int32_t>(i);
+    }
+
+    // Calls visit(candidate, weight) for c itself and every candidate near it that shares a kind with it.
+    template <class Visit>
+    void for_each_near(const Candidate& c, Visit&& visit) const {
+        const int u = column(c), v = row(c);
+        const int left = std::max(0, u - reach), right = std::min(cols_ - 1, u + reach);
+        for (int y = std::max(0, v - reach); y <= std::min(rows_ - 1, v + reach); ++y) {
+            const std::size_t line = static_cast<std::size_t>(y) * static_cast<std::size_t>(cols_);
+            const auto first = start_[line + static_cast<std::size_t>(left)];
+            const auto last = start_[line + static_cast<std::size_t>(right) + 1];
+            for (auto k = first; k < last; ++k) {
+                const Candidate& n = candidates_[static_cast<std::size_t>(items_[static_cast<std::size_t>(k)])];
+                if (!(n.kind & c.kind & kinds)) continue;
+                const float du = n.x - c.x, dv = n.y - c.y;
+                visit(n, std::exp(-(du * du + dv * dv) / (2 * spread * spread)));
+            }
+        }
+    }
+
+private:
+    int column(const Candidate& c) const { return std::min(std::max(static_cast<int>(std::lround(c.x)), 0), cols_ - 1); }
+    int row(const Candidate& c) const { return std::min(std::max(static_cast<int>(std::lround(c.y)), 0), rows_ - 1); }
+    std::size_t cell(const Candidate& c) const {
+        return static_cast<std::size_t>(row(c)) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(column(c));
+    }
+
+    const std::vector<Candidate>& candidates_;
+    int rows_, cols_;
+    std::vector<std::int32_t> start_, items_;
+};
+
+float joint_significance(const Grid& grid, const Candidate& c) {
+    float sum = 0;
+    grid.for_each_near(c, [&](const Candidate& n, float weight) {
+        const float s = std::min(n.significance, capped);
+        sum += weight * s * s;
+    });
+    return std::sqrt(sum);
+}
+
+// The gradient of a surface's ordinate from slopes along several directions, by weighted least squares.
+struct Gradient {
+    double xx = 0, xy = 0, yy = 0, xm = 0, ym = 0, value = 0, weight = 0;
+
+    void add(const float along[2], const Side& side, double w) {
+        const double x = static_cast<double>(along[0]), y = static_cast<double>(along[1]);
+        const double m = static_cast<double>(side.slope);
+        const double ws = w / std::max(static_cast<double>(side.slope_variance), 1e-30);
+        xx += ws * x * x, xy += ws * x * y, yy += ws * y * y;
+        xm += ws * x * m, ym += ws * y * m;
+        value += w * static_cast<double>(side.value), weight += w;
+    }
+    // The surface's normal; false where the directions do not fix it.
+    bool normal(bool projective, const double place[2], Vector& n) const {
+        const double determinant = xx * yy - xy * xy;
+        if (!(determinant > 0.02 * xx * yy) || !(xx * yy > 0)) return false;
+        const double gx = (yy * xm - xy * ym) / determinant, gy = (xx * ym - xy * xm) / determinant;
+        // q = gx X + gy Y + g0 is the plane gx x + gy y + g0 z = 1.
+        n = {gx, gy, projective ? value / weight - gx * place[0] - gy * place[1] : 1};
+        return true;
+    }
+};
+
+// The angle between the two surfaces that meet at c, in degrees; negative where its neighbours do not fix it.
+double normal_angle(const Grid& grid, const Candidate& c, bool projective) {
+    // The edge runs the way its candidates lie: across it, their positions vary least.
+    double n = 0, mx = 0, my = 0, sxx = 0, sxy = 0, syy = 0;
+    grid.for_each_near(c, [&](const Candidate& near, float weight) {
+        const double w = static_cast<double>(weight), x = static_cast<double>(near.x - c.x), y = static_cast<double>(near.y - c.y);
+        n += w, mx += w * x, my += w * y, sxx += w * x * x, sxy += w * x * y, syy += w * y * y;
+    });
+    mx /= n, my /= n;
+    sxx = sxx / n - mx * mx, sxy = sxy / n - mx * my, syy = syy / n - my * my;
+    if (!(sxx + syy > 0.05)) return -1;
+    const double angle = 0.5 * std::atan2(2 * sxy, sxx - syy);  // of the edge
+    const double across[2] = {-std::sin(angle), std::cos(angle)};
+    Gradient a, b;
+    double place[2] = {0, 0};
+    grid.for_each_near(c, [&](const Candidate& near, float weight) {
+        const double w = static_cast<double>(weight);
+        const int dcol = near.direction == 2 ? 0 : 1, drow = near.direction == 1 ? 0 : near.direction == 4 ? -1 : 1;
+        const bool forward = dcol * across[0] + drow * across[1] > 0;
+        a.add(near.along, near.sides[forward ? 0 : 1], w);
+        b.add(near.along, near.sides[forward ? 1 : 0], w);
+        for (int i = 0; i < 2; ++i) place[i] += w * static_cast<double>(near.place[i]);
+    });
+    for (double& p : place) p /= n;
+    Vector na{}, nb{};
+    if (!a.normal(projective, place, na) || !b.normal(projective, place, nb)) return -1;
+    const Vector cross{na.y * nb.z - na.z * nb.y, na.z * nb.x - na.x * nb.z, na.x * nb.y - na.y * nb.x};
+    const double dot = na.x * nb.x + na.y * nb.y + na.z * nb.z;
+    return std::atan2(std::sqrt(cross.x * cross.x + cross.y * cross.y + cross.z * cross.z), dot) * degrees;
+}
+
+}  // namespace
+
+void pool(std::vector<Candidate>& candidates, int rows, int cols, bool projective, const Parameters& parameters) {
+    const auto least = static_cast<float>(parameters.min_significance);
+    if (!(least > 0) && !parameters.normals) return;
+    std::vector<Candidate> kept(candidates);
+    const int count = static_cast<int>(candidates.size());
+    {
+        const Grid grid(candidates, rows, cols);
+        parallel_for(count, parameters.threads, [&](int begin, int end, int) {
+            for (int i = begin; i < end; ++i) {
+                Candidate& c = kept[static_cast<std::size_t>(i)];
+                c.significance = joint_significance(grid, candidates[static_cast<std::size_t>(i)]);
+            }
+        });
+    }
+    kept.erase(std::remove_if(kept.begin(), kept.end(), [&](const Candidate& c) { return c.significance < least; }), kept.end());
+    candidates = kept;
+    if (!parameters.normals) return;
+    const Grid grid(kept, rows, cols);
+    parallel_for(static_cast<int>(kept.size()), parameters.threads, [&](int begin, int end, int) {
+        for (int i = begin; i < end; ++i) {
+            Candidate& c = candidates[static_cast<std::size_t>(i)];
+            const double angle = c.crease > 0 ? normal_angle(grid, kept[static_cast<std::size_t>(i)], projective) : -1;
+            if (angle >= 0) c.crease = static_cast<float>(angle);
+        }
+    });
+}
+
+}  // namespace rangeedge
