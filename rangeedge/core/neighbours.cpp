@@ -14,6 +14,7 @@ constexpr double degrees = 57.295779513082320877;
 constexpr int reach = 3;               // pixels, in either axis
 constexpr float spread = 1.5f;         // pixels: standard deviation of the weight of a neighbour
 constexpr float capped = 8;            // a single candidate's share of the evidence
+constexpr float lone = 1 / 3.0f;       // what a candidate without neighbours is worth
 constexpr int kinds = jump_bit | convex_bit | concave_bit;
 
 struct Vector {
@@ -69,7 +70,7 @@ float joint_significance(const Grid& grid, const Candidate& c) {
         const float s = std::min(n.significance, capped);
         sum += weight * s * s;
     });
-    return std::sqrt(sum);
+    return std::max(std::sqrt(sum), c.significance * lone);
 }
 
 // The gradient of a surface's ordinate from slopes along several directions, by weighted least squares.
