@@ -3,8 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
-#include <cstdlib>
 #include <cstddef>
 #include <map>
 #include <numeric>
@@ -75,6 +73,7 @@ public:
     void sow_rest();
     void merge();
     void settle();
+    void dissolve();
     int finish(std::int32_t* labels);
 
 private:
@@ -228,7 +227,6 @@ void Grower::estimate_correlation(const std::vector<Pixels>& seeds) {
         sum += weight;
         if (2 * sum < total) continue;
         correlation_ = std::clamp(rms, 1.0, correlation_max);
-        if (std::getenv("RDBG")) std::fprintf(stderr, "corr %g\n", rms);
         return;
     }
 }
@@ -367,7 +365,7 @@ std::map<std::pair<int, int>, Grower::Border> Grower::borders() {
         if (beside_edge(p) || beside_edge(q)) return;
         ++border.open;
         const Surface &sa = of(a).surface, &sb = of(b).surface;
-        const double angle = (sa.curved || sb.curved ? 2 : 1) * parameters_.smooth_angle;
+        const double angle = (sa.curved || sb.curved ? 3 : 1) * parameters_.smooth_angle;
         border.smooth += meets_smoothly(p, q, sa, sb, 1.5 * parameters_.tolerance, angle);
         border.similar += meets_smoothly(p, q, sa, sb, 3 * parameters_.tolerance, 3 * parameters_.smooth_angle);
     };
@@ -394,6 +392,9 @@ void Grower::merge() {
         changed = false;
         std::vector<std::pair<int, std::pair<int, int>>> order;
         const auto found = borders();
+        std::vector<Pixels> pixels(patches_.size());
+        for (int p = 0; p < size_; ++p)
+            if (patch(p) && of(patch(p)).sums.count() < 5000) pixels[static_cast<std::size_t>(patch(p))].push_back(p);
         for (const auto& [pair, border] : found) order.push_back({-border.pixels, pair});
         std::sort(order.begin(), order.end());
         std::vector<char> touched(patches_.size(), 0);
@@ -404,16 +405,18 @@ void Grower::merge() {
             if (absorbed_[static_cast<std::size_t>(a)] || absorbed_[static_cast<std::size_t>(b)]) continue;
             const Border& border = found.at(pair);
             const double needed = 0.5 * std::sqrt(of(b).sums.count());
-            const bool small = of(b).sums.count() < 0.1 * of(a).sums.count();
-            if (std::getenv("RDBG2"))
-                std::fprintf(stderr, "%d %d counts %d %d at %.0f %.0f border %d open %d smooth %d similar %d one %d\n", a, b, of(a).sums.count(), of(b).sums.count(), of(b).surface.x0, of(b).surface.y0, border.pixels, border.open, border.smooth, border.similar, one_surface(a, b));
+            const bool small = of(b).sums.count() < 0.2 * of(a).sums.count();
+            int fitting = 0;
+            if (small && 2 * border.open > border.pixels)
+                for (const int p : pixels[static_cast<std::size_t>(b)]) fitting += residual(p, of(a).surface) < loose * parameters_.tolerance;
+            const bool explained = fitting > 0.8 * static_cast<double>(pixels[static_cast<std::size_t>(b)].size()) && fitting;
             if (one_surface(a, b)) {
                 of(a).sums = of(a).sums.joined(of(b).sums);
                 of(a).surface = surface_of(of(a).sums);
                 of(b).sums = SurfaceSums();
                 renumber(b, a);
                 touched[static_cast<std::size_t>(a)] = touched[static_cast<std::size_t>(b)] = 1;
-            } else if (border.pixels < needed || (small ? border.similar : border.smooth) <= 0.6 * border.pixels) {
+            } else if (!explained && (border.pixels < needed || (small ? border.similar : border.smooth) <= 0.6 * border.pixels)) {
                 continue;
             } else if (small) {
                 absorbed_[static_cast<std::size_t>(b)] = 1;
@@ -421,6 +424,43 @@ void Grower::merge() {
             region_[static_cast<std::size_t>(root(b))] = root(a);
             changed = true;
         }
+    }
+}
+
+// Strips along rounded edges are no surfaces: a small patch, open to its neighbours, whose pixels they explain.
+void Grower::dissolve() {
+    std::map<int, std::vector<int>> around;
+    std::map<int, Border> total;
+    for (const auto& [pair, border] : borders()) {
+        for (const auto& [i, j] : {pair, std::make_pair(pair.second, pair.first)}) {
+            around[i].push_back(j);
+            total[i].pixels += border.pixels;
+            total[i].open += border.open;
+        }
+    }
+    std::map<int, Pixels> pixels;
+    for (int p = 0; p < size_; ++p) {
+        const auto found = total.find(patch(p));
+        if (found != total.end() && found->second.open > 0.2 * found->second.pixels) pixels[patch(p)].push_back(p);
+    }
+    for (auto& [i, own] : pixels) {
+        if (region_[static_cast<std::size_t>(i)] != i) continue;
+        int largest = 0;
+        for (const int j : around[i]) largest = std::max(largest, of(j).sums.count());
+        if (of(i).sums.count() > 0.2 * largest) continue;
+        std::vector<int> best(own.size());
+        int fitting = 0;
+        for (std::size_t k = 0; k < own.size(); ++k) {
+            double least = HUGE_VAL;
+            for (const int j : around[i]) {
+                const double r = residual(own[k], of(j).surface);
+                if (r < least) least = r, best[k] = j;
+            }
+            fitting += least < loose * parameters_.tolerance;
+        }
+        if (fitting < 0.7 * static_cast<double>(own.size())) continue;
+        for (std::size_t k = 0; k < own.size(); ++k) patch(own[k]) = best[k];
+        of(i).sums = SurfaceSums();
     }
 }
 
@@ -520,6 +560,7 @@ int grow_regions(const RegionImage& image, const std::int32_t* markers, const Re
     grower.merge();
     grower.settle();
     grower.merge();
+    grower.dissolve();
     return grower.finish(labels);
 }
 
