@@ -14,9 +14,6 @@ from .geometry import RangeFrame, range_frame
 from .noise import NoiseModel, noise_of
 from .seeds import extractSeeds
 
-_LATERAL = 0.35  # pixels: by how much a sample may stem from beside its line of sight
-
-
 def growRegions(
     src: np.ndarray,
     markers: np.ndarray,
@@ -70,46 +67,39 @@ def segmentRegions(
 def _grown(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, newSeeds) -> np.ndarray:
     parameters = _core.RegionParameters(
         tolerance=number(func, "tolerance", tolerance, 0, above=True),
-        lateral=_LATERAL,
         smooth_angle=number(func, "smoothAngle", smoothAngle, 0, 45),
         min_area=integer(func, "minArea", minArea, 1),
         new_seeds=boolean(func, "newSeeds", newSeeds),
     )
+    noise = noise_of(frame) if noise is None else noise
     labels = np.zeros(frame.shape, np.int32)
     if frame.valid.any():
-        _core.grow_regions(**_image_plane(frame, noise), edges=edges, markers=markers, parameters=parameters, labels=labels)
+        _core.grow_regions(**range_map(frame, noise, edges), markers=markers, parameters=parameters, labels=labels)
     return labels
 
 
-def _image_plane(frame: RangeFrame, noise) -> dict[str, Any]:
+def range_map(frame: RangeFrame, noise: Any, edges: np.ndarray | None) -> dict[str, Any]:
+    """What the kernels on surfaces take: places on the image plane, ordinates, their noise, and edges."""
     x, y, to_plane = _places(frame)
-    ordinate = frame.ordinate.astype(np.float64)
-    sigma = _sigma(frame, noise)
-    unit = float(np.nanmedian(sigma))
-    offset = float(np.nanmedian(ordinate))
-    normal = ((ordinate - offset) / unit).astype(np.float32)
-    return dict(
-        x=x, y=y, ordinate=normal, sigma=(sigma / unit).astype(np.float32),
-        projective=frame.projective, offset=offset, unit=unit, to_plane=to_plane,
-    )
-
-
-def _sigma(frame, noise):
-    if noise is None:
-        noise = noise_of(frame)
     if not isinstance(noise, NoiseModel):
         noise = NoiseModel(c=noise) if frame.projective else NoiseModel(a=noise)
-    ordinate = frame.ordinate.astype(np.float64)
-    sigma = noise(1 / ordinate) * ordinate**2 if frame.projective else noise(np.abs(ordinate))
-    low, high = np.nanmin(ordinate), np.nanmax(ordinate)
-    floor = 1e-6 * (high - low) + 1e-6 * max(abs(low), abs(high)) + np.finfo(np.float32).tiny
-    return np.maximum(sigma, floor)
+    offset = float(np.nanmean(frame.ordinate[::4, ::4]))
+    return dict(
+        x=x,
+        y=y,
+        ordinate=(frame.ordinate - offset).astype(np.float32),
+        offset=offset,
+        projective=frame.projective,
+        to_plane=to_plane,
+        noise=(noise.a, noise.b, noise.c),
+        noise_map=None,
+        edges=edges,
+    )
 
 
 def _places(frame):
     if frame.samples.ndim == 2:
-        y, x = np.indices(frame.shape, np.float32)
-        return x, y, frame.to_plane
+        return None, None, frame.to_plane
     axis = np.asarray(frame.axis)
     side = np.cross([0, 1, 0] if abs(axis[1]) < 0.9 else [1, 0, 0], axis)
     side /= np.linalg.norm(side)
