@@ -8,10 +8,10 @@ import numpy as np
 
 from . import _core
 from ._args import boolean, fail, image8, integer, labels32s, number
+from .detector import detectEdges
 from .distance import distanceTransform
-from .edges import detectEdges
 from .geometry import RangeFrame, range_frame
-from .noise import NoiseModel, noise_of
+from .noise import kernel_noise
 from .seeds import extractSeeds
 
 def growRegions(
@@ -71,7 +71,6 @@ def _grown(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, 
         min_area=integer(func, "minArea", minArea, 1),
         new_seeds=boolean(func, "newSeeds", newSeeds),
     )
-    noise = noise_of(frame) if noise is None else noise
     labels = np.zeros(frame.shape, np.int32)
     if frame.valid.any():
         _core.grow_regions(**range_map(frame, noise, edges), markers=markers, parameters=parameters, labels=labels)
@@ -81,8 +80,7 @@ def _grown(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, 
 def range_map(frame: RangeFrame, noise: Any, edges: np.ndarray | None) -> dict[str, Any]:
     """What the kernels on surfaces take: places on the image plane, ordinates, their noise, and edges."""
     x, y, to_plane = _places(frame)
-    if not isinstance(noise, NoiseModel):
-        noise = NoiseModel(c=noise) if frame.projective else NoiseModel(a=noise)
+    coefficients, noise_map = kernel_noise("growRegions", noise, frame)
     offset = float(np.nanmean(frame.ordinate[::4, ::4]))
     return dict(
         x=x,
@@ -91,8 +89,8 @@ def range_map(frame: RangeFrame, noise: Any, edges: np.ndarray | None) -> dict[s
         offset=offset,
         projective=frame.projective,
         to_plane=to_plane,
-        noise=(noise.a, noise.b, noise.c),
-        noise_map=None,
+        noise=coefficients[:3],
+        noise_map=noise_map,
         edges=edges,
     )
 
