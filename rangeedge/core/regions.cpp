@@ -11,7 +11,6 @@
 namespace rangeedge {
 namespace {
 
-constexpr double lateral = 0.35;      // pixels: by how much a sample may stem from beside its line of sight
 constexpr double loose = 2.0;         // pixels at borders may lie farther off, by this factor
 constexpr int levels = 32;            // of squared residuals in the queue, per tolerance
 constexpr int max_cuts = 4;           // of one marker into planes
@@ -58,7 +57,7 @@ private:
 class Grower {
 public:
     Grower(const RangeMap& map, const RegionParameters& parameters)
-        : image_(map, lateral), parameters_(parameters), patch_(static_cast<std::size_t>(image_.size()), 0) {
+        : image_(map, lateral_deviation), parameters_(parameters), patch_(static_cast<std::size_t>(image_.size()), 0) {
         create(SurfaceSums(), Surface());
     }
 
