@@ -145,9 +145,10 @@ def camera_matrix(func: str, name: str, value: Any) -> np.ndarray:
 
 def pixel_size(func: str, name: str, value: Any) -> tuple[float, float]:
     """The spacing (dx, dy) of a grid; one number is both."""
-    if not isinstance(value, (tuple, list, np.ndarray)):
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(value, (tuple, list)):
         value = (value, value)
-    if np.shape(value) != (2,):
+    if len(value) != 2:
         raise fail(func, name, "a length or a pair (dx, dy)", described(value), cv2.Error.StsBadSize)
     dx, dy = (number(func, name, h, 0, above=True) for h in value)
     return dx, dy
