@@ -1,9 +1,120 @@
-"""Edges in range images by scan line approximation, and what follows from them."""
+"""Edges in range images by scan line approximation, and what follows from them: distances, seeds and regions."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from ._args import error
-from ._constants import *  # noqa: F403
-from .detector import detectEdges
-from .distance import *
+from ._constants import (
+    CREASE_MAX,
+    CREASE_NORMAL,
+    DIR_ALL,
+    DIR_COLS,
+    DIR_DIAG45,
+    DIR_DIAG135,
+    DIR_ROWS,
+    EDGE_BOUNDARY,
+    EDGE_CONCAVE,
+    EDGE_CONVEX,
+    EDGE_JUMP,
+    EDGE_OCCLUDED,
+    EDGE_OCCLUDING,
+    FIT_INTERP,
+    FIT_LSQ,
+    MEASURE_ENDPOINT,
+    MEASURE_MIDPOINT,
+    SALIENCE_ADDITIVE,
+    SALIENCE_MULTIPLICATIVE,
+    THIN_ITERATIVE,
+    THIN_LEE,
+    THIN_SKELETON,
+)
+from .detector import ScanLineDetector, createScanLineDetector, detectEdges
+from .distance import (
+    distanceTransform,
+    distanceTransformWithLabels,
+    salienceDistanceTransform,
+    salienceDistanceTransformWithLabels,
+)
+from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
 from .edges import EdgeStrength, ScanLineParams, edgePoints, edgeStrength, splitScanLine
+from .io import RangeImage, imreadRange, imwriteRange
 from .noise import NoiseModel, estimateNoise
+from .seeds import extractSeeds, extractSeedsWithStats
+from .selection import overallStrength, selectEdges, strengthImage
+from .thinning import thinEdges
+
+if TYPE_CHECKING:
+    from . import evaluation as evaluation
+    from . import optimality as optimality
+    from . import synthetic as synthetic
+
 __version__ = "0.1.0"
+
+# In the order data flows.
+__all__ = [  # noqa: RUF022
+    "error",
+    "RangeImage",
+    "imreadRange",
+    "imwriteRange",
+    "NoiseModel",
+    "estimateNoise",
+    "ScanLineParams",
+    "splitScanLine",
+    "EdgeStrength",
+    "edgeStrength",
+    "edgePoints",
+    "strengthImage",
+    "overallStrength",
+    "selectEdges",
+    "thinEdges",
+    "detectEdges",
+    "ScanLineDetector",
+    "createScanLineDetector",
+    "distanceTransform",
+    "distanceTransformWithLabels",
+    "salienceDistanceTransform",
+    "salienceDistanceTransformWithLabels",
+    "extractSeeds",
+    "extractSeedsWithStats",
+    "drawEdges",
+    "drawRegions",
+    "colorizeDistance",
+    "drawOverview",
+    "DIR_ROWS",
+    "DIR_COLS",
+    "DIR_DIAG45",
+    "DIR_DIAG135",
+    "DIR_ALL",
+    "FIT_LSQ",
+    "FIT_INTERP",
+    "MEASURE_MIDPOINT",
+    "MEASURE_ENDPOINT",
+    "CREASE_MAX",
+    "CREASE_NORMAL",
+    "EDGE_JUMP",
+    "EDGE_CONVEX",
+    "EDGE_CONCAVE",
+    "EDGE_OCCLUDING",
+    "EDGE_OCCLUDED",
+    "EDGE_BOUNDARY",
+    "THIN_SKELETON",
+    "THIN_LEE",
+    "THIN_ITERATIVE",
+    "SALIENCE_MULTIPLICATIVE",
+    "SALIENCE_ADDITIVE",
+]
+
+_SUBMODULES = ("evaluation", "optimality", "synthetic")  # imported when first asked for
+
+if not TYPE_CHECKING:
+
+    def __getattr__(name: str) -> Any:
+        if name in _SUBMODULES:
+            return import_module(f".{name}", __name__)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_SUBMODULES})

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/array.h>
 
+#include <array>
 #include <cstdint>
 
+#include "regions.hpp"
 #include "seeds.hpp"
 
 namespace nb = nanobind;
@@ -13,11 +16,28 @@ namespace {
 
 template <class T>
 using Map = nb::ndarray<T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Optional = Map<const float>;
 
 int extract_seeds(const Map<const float>& distance, const Map<const std::uint8_t>& mask, float min_distance,
                   float separation, const Map<std::int32_t>& markers) {
     return rangeedge::extract_seeds(distance.data(), mask.data(), static_cast<int>(distance.shape(0)),
                                     static_cast<int>(distance.shape(1)), min_distance, separation, markers.data());
+}
+
+rangeedge::RangeMap range_map(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
+                              bool projective, const std::array<double, 6>& to_plane,
+                              const std::array<double, 3>& noise, const Optional& noise_map,
+                              const Map<const std::uint8_t>& edges) {
+    return {static_cast<int>(ordinate.shape(0)), static_cast<int>(ordinate.shape(1)), x.data(), y.data(),
+            ordinate.data(), offset, projective, to_plane, noise, noise_map.data(), edges.data()};
+}
+
+int grow_regions(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset, bool projective,
+                 const std::array<double, 6>& to_plane, const std::array<double, 3>& noise, const Optional& noise_map,
+                 const Map<const std::uint8_t>& edges, const Map<const std::int32_t>& markers,
+                 const rangeedge::RegionParameters& parameters, const Map<std::int32_t>& labels) {
+    const auto map = range_map(x, y, ordinate, offset, projective, to_plane, noise, noise_map, edges);
+    return rangeedge::grow_regions(map, markers.data(), parameters, labels.data());
 }
 
 }  // namespace
@@ -26,4 +46,16 @@ int extract_seeds(const Map<const float>& distance, const Map<const std::uint8_t
 void bind_regions(nb::module_& m) {
     m.def("extract_seeds", &extract_seeds, "distance"_a.noconvert(), "mask"_a.noconvert().none(), "min_distance"_a,
           "separation"_a, "markers"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
+    using rangeedge::RegionParameters;
+    nb::class_<RegionParameters>(m, "RegionParameters")
+        .def(
+            "__init__",
+            [](RegionParameters* self, double tolerance, double smooth_angle, int min_area, bool new_seeds) {
+                new (self) RegionParameters{tolerance, smooth_angle, min_area, new_seeds};
+            },
+            nb::kw_only(), "tolerance"_a, "smooth_angle"_a, "min_area"_a, "new_seeds"_a);
+    m.def("grow_regions", &grow_regions, "x"_a.noconvert().none(), "y"_a.noconvert().none(), "ordinate"_a.noconvert(),
+          "offset"_a, "projective"_a, "to_plane"_a, "noise"_a, "noise_map"_a.noconvert().none(),
+          "edges"_a.noconvert().none(), "markers"_a.noconvert(), "parameters"_a, "labels"_a.noconvert(),
+          nb::call_guard<nb::gil_scoped_release>());
 }

@@ -49,6 +49,8 @@ enum Kind : std::uint8_t {
     occluded_bit = 16,
 };
 
+constexpr float endless = 1e30f;  // at most so large are variances and significances
+
 // One side of a cut: the curve's ordinate there, its slope per unit of the plane and the slope's variance.
 struct Side {
     float value, slope, slope_variance;

@@ -81,7 +81,8 @@ struct Gradient {
     void add(const float along[2], const Side& side, double w) {
         const double x = static_cast<double>(along[0]), y = static_cast<double>(along[1]);
         const double m = static_cast<double>(side.slope);
-        const double ws = w / std::max(static_cast<double>(side.slope_variance), 1e-30);
+        // A slope that its samples do not fix says nothing.
+        const double ws = side.slope_variance < endless ? w / std::max(static_cast<double>(side.slope_variance), 1e-30) : 0;
         xx += ws * x * x, xy += ws * x * y, yy += ws * y * y;
         xm += ws * x * m, ym += ws * y * m;
         value += w * static_cast<double>(side.value), weight += w;

@@ -1,0 +1,73 @@
+"""The compiled kernels. Arrays are C-contiguous; outputs are written in place."""
+
+from collections.abc import Sequence
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+_Real = TypeVar("_Real", np.float32, np.float64)
+_Salience = TypeVar("_Salience", np.uint8, np.float32)
+
+class Parameters:
+    def __init__(
+        self,
+        *,
+        eps: float,
+        eps_factor: float,
+        directions: int,
+        interpolate: bool,
+        endpoint: bool,
+        normals: bool,
+        max_shift: float,
+        max_gap: int,
+        max_fillet: int,
+        margin: int,
+        merge_significance: float,
+        min_significance: float,
+        threads: int,
+    ) -> None: ...
+
+def split_scan_line(y: NDArray[_Real], x: NDArray[_Real] | None, eps: float) -> NDArray[np.int32]: ...
+def edge_candidates(
+    src: NDArray[_Real],
+    projective: bool,
+    to_plane: Sequence[float],
+    axis: Sequence[float],
+    noise: Sequence[float],
+    noise_map: NDArray[np.float32] | None,
+    parameters: Parameters,
+) -> dict[str, NDArray[Any]]: ...
+def edge_strength(
+    src: NDArray[_Real],
+    projective: bool,
+    to_plane: Sequence[float],
+    axis: Sequence[float],
+    noise: Sequence[float],
+    noise_map: NDArray[np.float32] | None,
+    parameters: Parameters,
+    jump: NDArray[np.float32],
+    crease: NDArray[np.float32],
+    kind: NDArray[np.uint8],
+    significance: NDArray[np.float32],
+) -> None: ...
+def distance_transform(
+    edges: NDArray[np.uint8], distance: NDArray[np.float32], labels: NDArray[np.int32] | None, threads: int
+) -> None: ...
+def salience_multiplicative(
+    salience: NDArray[_Salience], distance: NDArray[np.float32], labels: NDArray[np.int32] | None, threads: int
+) -> None: ...
+def salience_additive(
+    salience: NDArray[_Salience],
+    lambda_: float,
+    distance: NDArray[np.float32],
+    labels: NDArray[np.int32] | None,
+    threads: int,
+) -> None: ...
+def extract_seeds(
+    distance: NDArray[np.float32],
+    mask: NDArray[np.uint8] | None,
+    min_distance: float,
+    separation: float,
+    markers: NDArray[np.int32],
+) -> int: ...
