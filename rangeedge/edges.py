@@ -58,7 +58,7 @@ class ScanLineParams:
         Scan lines to use: DIR_ROWS, DIR_COLS, DIR_DIAG45, DIR_DIAG135 combined by `|`, or DIR_ALL.
     fit : int
         FIT_LSQ, least squares over a segment, a line unless a quadratic is significant; or FIT_INTERP, the quadratic
-        through end points and midpoint. With FIT_INTERP cuts are neither merged nor cleared of rounded edges.
+        through end points and midpoint. With FIT_INTERP cuts stay as they fall.
     measure : int
         MEASURE_MIDPOINT, strengths where the edge is; or MEASURE_ENDPOINT, extrapolated from either end point.
     crease : int
@@ -67,13 +67,9 @@ class ScanLineParams:
         How far, in pixels, the adapted edge position may lie from the cut (P§4.2, Fig. 5); 0 keeps the cut.
     maxGap : int
         Widest gap of invalid pixels on a scan line whose two sides are compared: occlusion shadows.
-    maxFillet : int
-        Longest segment, in pixels, that may be the rounding of an edge between its neighbours; 0 switches this off.
-    margin : int
-        Pixels beside each cut that fits leave out where a segment is long enough, since they may see both surfaces.
     mergeSignificance : float
-        Cuts are taken back while that raises the sum of squares by less than its square, in noise variances; 0 keeps
-        all.
+        Cuts are taken back where that raises the sum of squared residuals by less than its square, in variances of the
+        noise; a segment across an edge, or its rounding, is given to the surfaces beside it likewise. 0 keeps all.
     minSignificance : float
         Candidates are dropped whose significance, joined with that of their neighbours, is below this; 0 keeps all.
 
@@ -103,9 +99,7 @@ class ScanLineParams:
     crease: int = CREASE_MAX
     maxShift: float = 4.0
     maxGap: int = 8
-    maxFillet: int = 10
-    margin: int = 1
-    mergeSignificance: float = 6.5
+    mergeSignificance: float = 5.5
     minSignificance: float = 10.0
 
     def __post_init__(self) -> None:
@@ -120,13 +114,12 @@ class ScanLineParams:
         flag(func, "crease", self.crease, {"CREASE_MAX": CREASE_MAX, "CREASE_NORMAL": CREASE_NORMAL})
         for name in ("maxShift", "mergeSignificance", "minSignificance"):
             number(func, name, getattr(self, name), 0)
-        for name in ("maxGap", "maxFillet", "margin"):
-            integer(func, name, getattr(self, name), 0)
+        integer(func, "maxGap", self.maxGap, 0)
 
     @classmethod
     def paper(cls, **options: Any) -> ScanLineParams:
         """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept."""
-        basic = {"fit": FIT_INTERP, "maxShift": 0.0, "maxGap": 0, "maxFillet": 0, "margin": 0}
+        basic = {"fit": FIT_INTERP, "maxShift": 0.0, "maxGap": 0}
         return cls(**{**basic, "mergeSignificance": 0.0, "minSignificance": 0.0, **options})
 
 
@@ -386,8 +379,6 @@ def _kernel_parameters(params: ScanLineParams, frame: RangeFrame) -> _core.Param
         normals=params.crease == CREASE_NORMAL,
         max_shift=params.maxShift,
         max_gap=params.maxGap,
-        max_fillet=params.maxFillet,
-        margin=params.margin,
         merge_significance=params.mergeSignificance,
         min_significance=params.minSignificance,
         threads=cv2.getNumThreads() if frame.shape[0] * frame.shape[1] >= _THREAD_PIXELS else 1,

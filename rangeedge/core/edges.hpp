@@ -35,8 +35,6 @@ struct Parameters {
     bool normals;               // crease angles between surface normals
     double max_shift;           // between the cut and the adapted position
     int max_gap;                // between the ends of two runs that are compared
-    int max_fillet;             // longest segment that may be a rounded edge
-    int margin;                 // samples beside a cut that the fit leaves out
     double merge_significance;  // below it a cut is taken back
     double min_significance;    // below it a candidate is dropped
     int threads;
