@@ -62,7 +62,8 @@ class ScanLineParams:
     measure : int
         MEASURE_MIDPOINT, strengths where the edge is; or MEASURE_ENDPOINT, extrapolated from either end point.
     crease : int
-        CREASE_MAX, the largest directional angle (P§4.2); or CREASE_NORMAL, the angle between surface normals.
+        CREASE_NORMAL, the angle between the surface normals, which the tangents of several scan lines give; or
+        CREASE_MAX, the largest directional angle (P§4.2).
     maxShift : float
         How far, in pixels, the adapted edge position may lie from the cut (P§4.2, Fig. 5); 0 keeps the cut.
     maxGap : int
@@ -96,7 +97,7 @@ class ScanLineParams:
     directions: int = DIR_ALL
     fit: int = FIT_LSQ
     measure: int = MEASURE_MIDPOINT
-    crease: int = CREASE_MAX
+    crease: int = CREASE_NORMAL
     maxShift: float = 4.0
     maxGap: int = 8
     mergeSignificance: float = 5.5
@@ -119,7 +120,7 @@ class ScanLineParams:
     @classmethod
     def paper(cls, **options: Any) -> ScanLineParams:
         """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept."""
-        basic = {"fit": FIT_INTERP, "maxShift": 0.0, "maxGap": 0}
+        basic = {"fit": FIT_INTERP, "crease": CREASE_MAX, "maxShift": 0.0, "maxGap": 0}
         return cls(**{**basic, "mergeSignificance": 0.0, "minSignificance": 0.0, **options})
 
 
