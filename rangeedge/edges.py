@@ -201,8 +201,8 @@ def splitScanLine(z: np.ndarray, eps: float, pixelSize: float | np.ndarray = 1.0
     Examples
     --------
     >>> import numpy as np
-    >>> splitScanLine(np.array([0, 1, 2, 3, 4, 4, 4, 4, 4.0]), 0.1).tolist()
-    [[0, 4], [5, 8]]
+    >>> splitScanLine(np.array([0, 1, 2, 3, 4, 4, 4, 4.0]), 0.1).tolist()
+    [[0, 3], [4, 7]]
     """
     func = "splitScanLine"
     z = array(func, "z", z, "a real array of shape (N,)", ndim=(1,))
