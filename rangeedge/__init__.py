@@ -30,7 +30,7 @@ from ._constants import (
     THIN_LEE,
     THIN_SKELETON,
 )
-from .detector import detectEdges
+from .detector import ScanLineDetector, createScanLineDetector, detectEdges
 from .distance import (
     distanceTransform,
     distanceTransformWithLabels,
@@ -70,6 +70,8 @@ __all__ = [  # noqa: RUF022
     "selectEdges",
     "thinEdges",
     "detectEdges",
+    "ScanLineDetector",
+    "createScanLineDetector",
     "distanceTransform",
     "distanceTransformWithLabels",
     "salienceDistanceTransform",
@@ -106,11 +108,12 @@ __all__ = [  # noqa: RUF022
 
 _SUBMODULES = ("evaluation", "optimality", "synthetic")  # imported when first asked for
 
+if not TYPE_CHECKING:
 
-def __getattr__(name: str) -> Any:
-    if name in _SUBMODULES:
-        return import_module(f".{name}", __name__)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    def __getattr__(name: str) -> Any:
+        if name in _SUBMODULES:
+            return import_module(f".{name}", __name__)
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:

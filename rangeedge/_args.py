@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import cv2
@@ -24,6 +25,15 @@ class error(cv2.error, ValueError):
 def fail(func: str, name: str, expected: str, got: Any, code: int = cv2.Error.StsBadArg) -> error:
     """The exception for argument `name` of `func`; the caller raises it."""
     return error(func, f"`{name}` must be {expected}, got {got}", code)
+
+
+@contextmanager
+def errors_of(func: str) -> Iterator[None]:
+    """Errors of the functions called inside name `func`, which is what the user called."""
+    try:
+        yield
+    except error as problem:
+        raise error(func, problem.err, problem.code) from None
 
 
 def described(value: Any) -> str:
@@ -131,6 +141,17 @@ def camera_matrix(func: str, name: str, value: Any) -> np.ndarray:
     if not (upper and np.isfinite(matrix).all()):
         raise fail(func, name, expected, matrix.tolist())
     return matrix
+
+
+def pixel_size(func: str, name: str, value: Any) -> tuple[float, float]:
+    """The spacing (dx, dy) of a grid; one number is both."""
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(value, (tuple, list)):
+        value = (value, value)
+    if len(value) != 2:
+        raise fail(func, name, "a length or a pair (dx, dy)", described(value), cv2.Error.StsBadSize)
+    dx, dy = (number(func, name, h, 0, above=True) for h in value)
+    return dx, dy
 
 
 def deliver(func: str, name: str, result: np.ndarray, dst: np.ndarray | None) -> np.ndarray:

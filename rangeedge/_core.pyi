@@ -21,8 +21,6 @@ class Parameters:
         normals: bool,
         max_shift: float,
         max_gap: int,
-        max_fillet: int,
-        margin: int,
         merge_significance: float,
         min_significance: float,
         threads: int,

@@ -8,8 +8,7 @@ namespace rangeedge {
 namespace {
 
 constexpr double curved_significance = 5;  // of the quadratic term of a least-squares fit
-constexpr int margin_keeps = 8;            // samples that a fit keeps whatever the margin
-constexpr double fillet_tolerance = 1.5;   // residuals of a rounded edge, in tolerances
+constexpr double straddling = 2;           // how much more, in significance, a segment across an edge may cost
 
 template <class T>
 class Approximator {
@@ -55,7 +54,7 @@ public:
     // Takes back cuts, the least significant first, until each one left lowers the sum of squares enough.
     void merge() {
         const double limit = parameters_.merge_significance * parameters_.merge_significance;
-        if (r_.segments.size() < 2 || !(limit > 0)) return;
+        if (r_.segments.size() < 2) return;
         r_.costs.resize(r_.segments.size() - 1);
         for (std::size_t i = 0; i < r_.costs.size(); ++i) r_.costs[i] = cost_of_merging(i);
         while (!r_.costs.empty()) {
@@ -72,32 +71,14 @@ public:
         }
     }
 
-    // Samples beside a cut may see both surfaces: the fit of a long segment leaves them out.
-    void leave_out_margins() {
-        for (std::size_t i = 0; i < r_.segments.size(); ++i) {
-            const Segment& s = r_.segments[i];
-            const int margin = std::min(parameters_.margin, (s.size() - margin_keeps) / 2);
-            if (margin <= 0) continue;
-            for (int d = 0; d < margin; ++d) {
-                add(r_.moments[i], s.first + d, -1);
-                add(r_.moments[i], s.last - d, -1);
-            }
-            r_.curves[i] = fit_least_squares(r_.moments[i], sigma(s), curved_significance);
-        }
-    }
-
-    // A short segment between two longer ones whose curves meet there is the rounding of one edge, or a sliver that
-    // splitting left: its samples go to the curve on their side of the meeting.
-    void dissolve_fillets() {
+    // Splitting may leave a segment across an edge, its rounding included, where one cut would do. It is taken out
+    // where the curves beside it meet within it and, given its samples, explain them nearly as well.
+    void dissolve() {
         for (std::size_t i = 1; i + 1 < r_.segments.size();) {
-            const int cut = fillet_cut(i);
-            if (cut < r_.segments[i].first - 1) {
+            if (dissolved(i))
+                i = std::max<std::size_t>(1, i - 1);
+            else
                 ++i;
-                continue;
-            }
-            r_.segments[i - 1].last = cut;
-            r_.segments[i + 1].first = cut + 1;
-            erase(i);
         }
     }
 
@@ -108,7 +89,7 @@ private:
         moments.base = line_.ordinate(k);
         return moments;
     }
-    void add(Moments& moments, int k, double sign = 1) const { moments.add(line_.abscissa(k), line_.ordinate(k), sign); }
+    void add(Moments& moments, int k) const { moments.add(line_.abscissa(k), line_.ordinate(k)); }
 
     double sigma(const Segment& s) const { return line_.sigma_at(s.first + s.size() / 2); }
 
@@ -131,24 +112,31 @@ private:
         return (one.sum_squares - r_.curves[i].sum_squares - r_.curves[i + 1].sum_squares) / (s * s);
     }
 
-    // The sample before the meeting that makes segment i a fillet; less than `first - 1` where it is none.
-    int fillet_cut(std::size_t i) const {
-        const Segment& s = r_.segments[i];
-        const int none = s.first - 2;
-        if (s.size() > parameters_.max_fillet || !adjacent(i - 1) || !adjacent(i)) return none;
-        if (s.size() > std::min(r_.segments[i - 1].size(), r_.segments[i + 1].size())) return none;
+    bool dissolved(std::size_t i) {
+        if (!adjacent(i - 1) || !adjacent(i)) return false;
+        const Segment s = r_.segments[i];
         const Curve &f = r_.curves[i - 1], &g = r_.curves[i + 1];
         double x = 0;
-        if (!intersection(f, g, (line_.abscissa(s.first) + line_.abscissa(s.last)) / 2, x)) return none;
-        if (x < line_.abscissa(s.first - 1) || x > line_.abscissa(s.last + 1)) return none;
+        if (!intersection(f, g, (line_.abscissa(s.first) + line_.abscissa(s.last)) / 2, x)) return false;
+        if (x < line_.abscissa(s.first - 1) || x > line_.abscissa(s.last + 1)) return false;
         int cut = s.first - 1;
+        Moments left = r_.moments[i - 1], right = r_.moments[i + 1];
         for (int k = s.first; k <= s.last; ++k) {
-            const double at = line_.abscissa(k);
-            if (at <= x) cut = k;
-            const double residual = std::abs(line_.ordinate(k) - (at <= x ? f : g).value(at));
-            if (!(residual <= fillet_tolerance * line_.tolerance_at(k))) return none;
+            if (line_.abscissa(k) <= x) cut = k;
+            add(k == cut ? left : right, k);
         }
-        return cut;
+        const double v = sigma(s);
+        const Curve to_cut = fit_least_squares(left, v, curved_significance);
+        const Curve from_cut = fit_least_squares(right, v, curved_significance);
+        const double before = f.sum_squares + r_.curves[i].sum_squares + g.sum_squares;
+        const double limit = straddling * parameters_.merge_significance * v;
+        if (!(to_cut.sum_squares + from_cut.sum_squares - before < limit * limit)) return false;
+        r_.segments[i - 1].last = cut;
+        r_.segments[i + 1].first = cut + 1;
+        r_.moments[i - 1] = left, r_.moments[i + 1] = right;
+        r_.curves[i - 1] = to_cut, r_.curves[i + 1] = from_cut;
+        erase(i);
+        return true;
     }
 
     const Line<T>& line_;
@@ -178,9 +166,9 @@ void approximate(const Line<T>& line, const Parameters& parameters, Approximatio
         return;
     }
     approximator.fit();
+    if (!(parameters.merge_significance > 0)) return;
     approximator.merge();
-    approximator.leave_out_margins();
-    approximator.dissolve_fillets();
+    approximator.dissolve();
 }
 
 template void approximate(const Line<float>&, const Parameters&, Approximation&);

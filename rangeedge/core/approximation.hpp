@@ -19,7 +19,7 @@ struct Approximation {
 };
 
 // Splits the line (section 4.1), fits a curve to every segment (4.2, end), takes back cuts that the noise explains,
-// and gives the rounding of an edge to the surfaces it joins.
+// and gives segments that lie across an edge to the surfaces beside it.
 template <class T>
 void approximate(const Line<T>& line, const Parameters& parameters, Approximation& result);
 

@@ -15,7 +15,6 @@ namespace {
 constexpr double degrees = 57.295779513082320877;
 constexpr double lone_significance = 3;  // of a candidate by itself, before its neighbours are asked
 constexpr double jump_tolerances = 2;    // what tells a jump from the approximation's own error
-constexpr float endless = 1e30f;
 
 // Where an edge is: between two samples, at an abscissa, also counted in samples.
 struct Cut {

@@ -35,8 +35,6 @@ struct Parameters {
     bool normals;               // crease angles between surface normals
     double max_shift;           // between the cut and the adapted position
     int max_gap;                // between the ends of two runs that are compared
-    int max_fillet;             // longest segment that may be a rounded edge
-    int margin;                 // samples beside a cut that the fit leaves out
     double merge_significance;  // below it a cut is taken back
     double min_significance;    // below it a candidate is dropped
     int threads;
@@ -50,6 +48,8 @@ enum Kind : std::uint8_t {
     occluding_bit = 8,  // of a candidate: the surface before the cut is the nearer one
     occluded_bit = 16,
 };
+
+constexpr float endless = 1e30f;  // at most so large are variances and significances
 
 // One side of a cut: the curve's ordinate there, its slope per unit of the plane and the slope's variance.
 struct Side {

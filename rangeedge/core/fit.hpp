@@ -11,11 +11,11 @@ struct Moments {
     double n = 0, x1 = 0, x2 = 0, x3 = 0, x4 = 0;
     double y0 = 0, y1 = 0, y2 = 0, yy = 0;
 
-    void add(double x, double y, double sign = 1) {
-        const double t = x - origin, t2 = t * t, h = y - base, v = sign * h;
-        n += sign;
-        x1 += sign * t, x2 += sign * t2, x3 += sign * t * t2, x4 += sign * t2 * t2;
-        y0 += v, y1 += v * t, y2 += v * t2, yy += v * h;
+    void add(double x, double y) {
+        const double t = x - origin, t2 = t * t, h = y - base;
+        n += 1;
+        x1 += t, x2 += t2, x3 += t * t2, x4 += t2 * t2;
+        y0 += h, y1 += h * t, y2 += h * t2, yy += h * h;
     }
     // The same sums, counted from another origin.
     Moments moved(double to) const {

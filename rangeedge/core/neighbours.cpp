@@ -15,6 +15,7 @@ constexpr int reach = 3;               // pixels, in either axis
 constexpr float spread = 1.5f;         // pixels: standard deviation of the weight of a neighbour
 constexpr float capped = 8;            // a single candidate's share of the evidence
 constexpr float lone = 1 / 3.0f;       // what a candidate without neighbours is worth
+constexpr int align_rounds = 2;
 constexpr int kinds = jump_bit | convex_bit | concave_bit;
 
 struct Vector {
@@ -80,7 +81,8 @@ struct Gradient {
     void add(const float along[2], const Side& side, double w) {
         const double x = static_cast<double>(along[0]), y = static_cast<double>(along[1]);
         const double m = static_cast<double>(side.slope);
-        const double ws = w / std::max(static_cast<double>(side.slope_variance), 1e-30);
+        // A slope that its samples do not fix says nothing.
+        const double ws = side.slope_variance < endless ? w / std::max(static_cast<double>(side.slope_variance), 1e-30) : 0;
         xx += ws * x * x, xy += ws * x * y, yy += ws * y * y;
         xm += ws * x * m, ym += ws * y * m;
         value += w * static_cast<double>(side.value), weight += w;
@@ -96,9 +98,15 @@ struct Gradient {
     }
 };
 
-// The angle between the two surfaces that meet at c, in degrees; negative where its neighbours do not fix it.
-double normal_angle(const Grid& grid, const Candidate& c, bool projective) {
-    // The edge runs the way its candidates lie: across it, their positions vary least.
+// The line on which a candidate and its neighbours lie: across it, their positions vary least.
+struct CommonLine {
+    double across[2];  // unit normal
+    double offset;     // of the line from the candidate, along `across`
+    double weight;     // of all neighbours
+    bool found;
+};
+
+CommonLine common_line(const Grid& grid, const Candidate& c) {
     double n = 0, mx = 0, my = 0, sxx = 0, sxy = 0, syy = 0;
     grid.for_each_near(c, [&](const Candidate& near, float weight) {
         const double w = static_cast<double>(weight), x = static_cast<double>(near.x - c.x), y = static_cast<double>(near.y - c.y);
@@ -106,15 +114,51 @@ double normal_angle(const Grid& grid, const Candidate& c, bool projective) {
     });
     mx /= n, my /= n;
     sxx = sxx / n - mx * mx, sxy = sxy / n - mx * my, syy = syy / n - my * my;
-    if (!(sxx + syy > 0.05)) return -1;
-    const double angle = 0.5 * std::atan2(2 * sxy, sxx - syy);  // of the edge
-    const double across[2] = {-std::sin(angle), std::cos(angle)};
+    const double angle = 0.5 * std::atan2(2 * sxy, sxx - syy);  // of the line
+    CommonLine line{{-std::sin(angle), std::cos(angle)}, 0, n, sxx + syy > 0.05};
+    line.offset = line.across[0] * mx + line.across[1] * my;
+    return line;
+}
+
+// One step of a candidate's scan line.
+struct Step {
+    int dcol, drow;
+};
+Step step_of(const Candidate& c) {
+    return {c.direction == 2 ? 0 : 1, c.direction == 1 ? 0 : c.direction == 4 ? -1 : 1};
+}
+
+// Moves a crease along its scan line onto the line it has in common with its neighbours.
+void align(const Grid& grid, const Candidate& c, int rows, int cols, double max_shift, Candidate& moved) {
+    if ((c.kind & jump_bit) || !(c.crease > 0)) return;
+    const CommonLine line = common_line(grid, c);
+    const Step step = step_of(c);
+    const double along = step.dcol * line.across[0] + step.drow * line.across[1];
+    if (!line.found || std::abs(along) < 0.3) return;
+    const double shift = line.offset / along;
+    if (std::abs(shift) > max_shift) return;
+    const double x = static_cast<double>(c.x) + shift * step.dcol, y = static_cast<double>(c.y) + shift * step.drow;
+    const int u = static_cast<int>(step.dcol ? std::floor(x) : std::round(x));
+    const int v = static_cast<int>(step.drow > 0 ? std::floor(y) : step.drow < 0 ? std::ceil(y) : std::round(y));
+    if (u < 0 || v < 0 || u >= cols || v >= rows || u + step.dcol >= cols || v + step.drow < 0 || v + step.drow >= rows) return;
+    moved.x = static_cast<float>(x);
+    moved.y = static_cast<float>(y);
+    moved.before = v * cols + u;
+    moved.after = (v + step.drow) * cols + u + step.dcol;
+}
+
+// The angle between the two surfaces that meet at c, in degrees; negative where its neighbours do not fix it.
+double normal_angle(const Grid& grid, const Candidate& c, bool projective) {
+    const CommonLine line = common_line(grid, c);
+    if (!line.found) return -1;
+    const double* across = line.across;
+    const double n = line.weight;
     Gradient a, b;
     double place[2] = {0, 0};
     grid.for_each_near(c, [&](const Candidate& near, float weight) {
         const double w = static_cast<double>(weight);
-        const int dcol = near.direction == 2 ? 0 : 1, drow = near.direction == 1 ? 0 : near.direction == 4 ? -1 : 1;
-        const bool forward = dcol * across[0] + drow * across[1] > 0;
+        const Step step = step_of(near);
+        const bool forward = step.dcol * across[0] + step.drow * across[1] > 0;
         a.add(near.along, near.sides[forward ? 0 : 1], w);
         b.add(near.along, near.sides[forward ? 1 : 0], w);
         for (int i = 0; i < 2; ++i) place[i] += w * static_cast<double>(near.place[i]);
@@ -145,6 +189,13 @@ void pool(std::vector<Candidate>& candidates, int rows, int cols, bool projectiv
     }
     kept.erase(std::remove_if(kept.begin(), kept.end(), [&](const Candidate& c) { return c.significance < least; }), kept.end());
     candidates = kept;
+    for (int round = 0; round < align_rounds; ++round) {
+        const Grid grid(kept, rows, cols);
+        parallel_for(static_cast<int>(kept.size()), parameters.threads, [&](int begin, int end, int) {
+            for (int i = begin; i < end; ++i) align(grid, kept[static_cast<std::size_t>(i)], rows, cols, parameters.max_shift, candidates[static_cast<std::size_t>(i)]);
+        });
+        kept = candidates;
+    }
     if (!parameters.normals) return;
     const Grid grid(kept, rows, cols);
     parallel_for(static_cast<int>(kept.size()), parameters.threads, [&](int begin, int end, int) {

@@ -1,0 +1,128 @@
+"""Edges of many range images: each into a folder of its own, those done already left alone."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import cv2
+
+from ._args import boolean, error, integer
+from .io import RangeImage, imreadRange
+from .results import EdgeResults, edge_files, find_edges, plain, write_folder
+
+
+class BatchItem(NamedTuple):
+    """What became of one image."""
+
+    path: str
+    folder: str
+    state: str  # "written", "skipped" or "failed"
+    message: str  # of the error, or empty
+
+
+def detectBatch(
+    paths: Iterable[str | os.PathLike[str]],
+    out: str | os.PathLike[str],
+    *,
+    jobs: int = 1,
+    force: bool = False,
+    **options: Any,
+) -> Iterator[BatchItem]:
+    """Detect the edges of many images and write them as the command `rangeedge detect` does.
+
+    detectBatch(paths, out, *[, jobs[, force[, ...]]]) -> items
+
+    The results of ``a/frame1.png`` go to ``out/frame1/``. An image that cannot be processed does not stop the others.
+    A folder is complete or not there; so a batch that was interrupted goes on where it stopped when it is run again.
+
+    Parameters
+    ----------
+    paths : iterable of paths
+        Range images, as `imreadRange` takes them. No two may have the same name before the suffix.
+    out : path
+        Folder of the folders, made where it is missing.
+    jobs : int
+        How many images are worked on at a time.
+    force : bool
+        Whether to process images again that have a folder newer than they are, made with the same options.
+    ...
+        As for `detectEdges`, for all images; a geometry given here replaces that of a file.
+
+    Returns
+    -------
+    items : iterator of BatchItem
+        One a path, in their order, each as soon as it and those before it are done.
+
+    Raises
+    ------
+    rangeedge.error
+        If two images would be written to the same folder, or `jobs` or `force` is no such thing.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> [item.state for item in detectBatch(["missing.png"], tempfile.mkdtemp())]
+    ['failed']
+    """
+    jobs = integer("detectBatch", "jobs", jobs, 1)
+    force = boolean("detectBatch", "force", force)
+    folders: dict[Path, str] = {}
+    for path in map(os.fspath, paths):
+        other = folders.setdefault(Path(out) / Path(path).stem, path)
+        if other != path:
+            raise error("detectBatch", f"{other!r} and {path!r} would be written to the same folder")
+    return _results([(path, folder) for folder, path in folders.items()], jobs, force, options)
+
+
+def _results(tasks: list[tuple[str, Path]], jobs: int, force: bool, options: dict[str, Any]) -> Iterator[BatchItem]:
+    with ThreadPoolExecutor(jobs) as pool:
+        try:
+            yield from pool.map(lambda task: _process(*task, force, options), tasks)
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _process(path: str, folder: Path, force: bool, options: dict[str, Any]) -> BatchItem:
+    if not force and _is_done(path, folder, options):
+        return BatchItem(path, str(folder), "skipped", "")
+    try:
+        detect_file(path, folder, options)
+    except Exception as problem:  # whatever it is, the other images go on
+        message = problem.msg if isinstance(problem, cv2.error) else f"{type(problem).__name__}: {problem}"
+        return BatchItem(path, str(folder), "failed", message)
+    return BatchItem(path, str(folder), "written", "")
+
+
+def detect_file(path: str, folder: Path, options: dict[str, Any]) -> EdgeResults:
+    """Edges of one image, written into a folder."""
+    image = read_image(path, options)
+    found = find_edges(image.src, **image.geometry)
+    write_folder(folder, edge_files(found, path, options))
+    return found
+
+
+def read_image(path: str, options: dict[str, Any]) -> RangeImage:
+    """An image of which `geometry` holds all options; a geometry among these replaces that of the file."""
+    options = dict(options)
+    image = imreadRange(path, calibration=options.pop("calibration", None))
+    known = image.geometry
+    if "K" in options or "pixelSize" in options:
+        known = {name: value for name, value in known.items() if name == "depthFactor"}
+    return RangeImage(image.src, {**known, **options})
+
+
+def _is_done(path: str, folder: Path, options: dict[str, Any]) -> bool:
+    """Whether a folder holds the results of these options, and is newer than the image."""
+    from . import __version__
+
+    try:
+        report = json.loads((folder / "report.json").read_bytes())
+        newer = (folder / "report.json").stat().st_mtime_ns >= Path(path).stat().st_mtime_ns
+        return newer and report["rangeedge"] == __version__ and report["options"] == plain(options)
+    except (OSError, ValueError, KeyError, TypeError):
+        return False

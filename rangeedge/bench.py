@@ -1,0 +1,101 @@
+"""How long each stage takes on this machine, beside `cv2.Canny` and a copy of the image."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any
+
+import cv2
+import numpy as np
+
+from . import __version__
+from ._args import integer
+from .detector import detectEdges
+from .distance import distanceTransform, salienceDistanceTransform
+from .edges import edgePoints, edgeStrength
+from .geometry import range_frame
+from .noise import estimateNoise
+from .seeds import extractSeeds
+from .selection import overallStrength, selectEdges
+from .thinning import thinEdges
+
+
+def benchmark(src: np.ndarray, *, repeat: int = 20, mask: np.ndarray | None = None, **geometry: Any) -> dict[str, Any]:
+    """Time the stages one after another in one process.
+
+    benchmark(src[, repeat[, mask[, K[, pixelSize[, heightMap[, depthFactor]]]]]]) -> retval
+
+    Parameters
+    ----------
+    src, mask, K, pixelSize, heightMap, depthFactor
+        The range image, as for `detectEdges`.
+    repeat : int
+        How often each stage runs, after one run that does not count.
+
+    Returns
+    -------
+    retval : dict
+        ``stages`` maps names to ``{"min": milliseconds, "median": milliseconds}``; besides, the size of the image,
+        the number of threads and the versions.
+
+    Raises
+    ------
+    rangeedge.error
+        On a bad argument.
+    """
+    repeat = integer("benchmark", "repeat", repeat, 1)
+    stages = _stages(src, mask, geometry)
+    return {
+        "width": src.shape[1],
+        "height": src.shape[0],
+        "threads": cv2.getNumThreads(),
+        "rangeedge": __version__,
+        "opencv": cv2.__version__,
+        "numpy": np.__version__,
+        "stages": {name: _timed(stage, repeat) for name, stage in stages.items()},
+    }
+
+
+def table(result: dict[str, Any]) -> str:
+    """The result of `benchmark`, to read."""
+    lines = [f"{result['width']} x {result['height']} pixels, {result['threads']} threads, OpenCV {result['opencv']}"]
+    lines += [f"{'milliseconds':28}{'min':>10}{'median':>10}"]
+    lines += [f"{name:28}{t['min']:10.3f}{t['median']:10.3f}" for name, t in result["stages"].items()]
+    return "\n".join(lines)
+
+
+def _stages(src: np.ndarray, mask: np.ndarray | None, geometry: dict[str, Any]) -> dict[str, Callable[[], Any]]:
+    """What is timed, by name; results of earlier stages are the input of later ones."""
+    depth = range_frame("benchmark", src, mask=mask, **geometry).depth
+    grey = cv2.normalize(np.nan_to_num(depth), None, 0, 255, cv2.NORM_MINMAX, cv2.CV_8U)
+    noise = estimateNoise(src, mask=mask, **geometry)
+    jump, crease, _, _ = edgeStrength(src, noise=noise, mask=mask, **geometry)
+    selected = selectEdges(jump, crease, 0.0, minLength=6)
+    thin = thinEdges(selected)
+    salience = overallStrength(jump, crease, max(float(jump.max()), 1e-6))
+    distance = distanceTransform(thin)
+    return {
+        "detectEdges": lambda: detectEdges(src, mask=mask, **geometry),
+        "  estimateNoise": lambda: estimateNoise(src, mask=mask, **geometry),
+        "  edgeStrength, noise given": lambda: edgeStrength(src, noise=noise, mask=mask, **geometry),
+        "  selectEdges": lambda: selectEdges(jump, crease, 0.0, minLength=6),
+        "  thinEdges": lambda: thinEdges(selected),
+        "edgePoints, noise given": lambda: edgePoints(src, noise=noise, mask=mask, **geometry),
+        "distanceTransform": lambda: distanceTransform(thin),
+        "salienceDistanceTransform": lambda: salienceDistanceTransform(salience),
+        "extractSeeds": lambda: extractSeeds(distance),
+        "cv2.Canny": lambda: cv2.Canny(grey, 50, 100),
+        "copy of the image": src.copy,
+    }
+
+
+def _timed(stage: Callable[[], Any], repeat: int) -> dict[str, float]:
+    stage()
+    times = []
+    for _ in range(repeat):
+        start = time.perf_counter()
+        stage()
+        times.append(1000 * (time.perf_counter() - start))
+    return {"min": min(times), "median": statistics.median(times)}

