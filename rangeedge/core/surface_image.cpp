@@ -10,6 +10,8 @@ namespace {
 constexpr double flat = 1.25;            // rms in standard deviations up to which a plane is one
 constexpr double curved_gain = 0.8;      // a quadratic must lower the rms to this share
 constexpr double roof_gain = 0.94;       // two planes must lower the rms of the quadratic to this share
+constexpr int roof_rounds = 8;
+constexpr double rounding = 2.5;        // pixels on either side of a ridge
 constexpr double correlation_max = 4.0;  // noise over a region, in units of that between pixels
 constexpr double resolution = 1e-6;      // of ordinates in single precision
 constexpr int sample_step = 7;           // one pixel in so many tells the typical noise
@@ -107,23 +109,29 @@ bool SurfaceImage::split_roof(const Pixels& pixels, const Surface& curved, Pixel
         const Sample s = sample(p);
         ((s.x - curved.x0) * cx + (s.y - curved.y0) * cy < 0 ? first : second).push_back(p);
     }
-    double rms = 0;
-    for (int round = 0; round < 8; ++round) {
-        if (first.size() < least_pixels || second.size() < least_pixels) return false;
-        const Surface a = sums_of(first).plane(), b = sums_of(second).plane();
-        first.clear(), second.clear();
-        rms = 0;
+    // The ridge itself may be rounded: neither fits nor the comparison count the pixels along it.
+    Pixels core_first = first, core_second = second;
+    double roof = 0, smooth = 0;
+    for (int round = 0; round < roof_rounds; ++round) {
+        if (core_first.size() < least_pixels || core_second.size() < least_pixels) return false;
+        const Surface a = sums_of(core_first).plane(), b = sums_of(core_second).plane();
+        const double bend = std::hypot(a.c[1] - b.c[1], a.c[2] - b.c[2]);
+        first.clear(), second.clear(), core_first.clear(), core_second.clear();
+        roof = smooth = 0;
         for (const int p : pixels) {
             const Sample s = sample(p);
             const double fa = a.value(s.x, s.y), fb = b.value(s.x, s.y);
             const bool in_first = convex ? fa <= fb : fa >= fb;
-            const double r = s.ordinate - (in_first ? fa : fb);
-            rms += s.weight * r * r;
             (in_first ? first : second).push_back(p);
+            if (std::abs(fa - fb) < rounding * bend) continue;
+            (in_first ? core_first : core_second).push_back(p);
+            const double r = s.ordinate - (in_first ? fa : fb), q = s.ordinate - curved.value(s.x, s.y);
+            roof += s.weight * r * r;
+            smooth += s.weight * q * q;
         }
     }
-    rms = std::sqrt(rms / static_cast<double>(pixels.size()));
-    return first.size() >= least_pixels && second.size() >= least_pixels && rms < roof_gain * curved.rms;
+    return core_first.size() >= least_pixels && core_second.size() >= least_pixels &&
+           roof < roof_gain * roof_gain * smooth;
 }
 
 // Of a projective image, the plane q = a x + b y + c holds the points with a X + b Y + c Z = 1.
