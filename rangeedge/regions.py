@@ -280,8 +280,8 @@ def _segment(
     smoothAngle: float,
     minArea: int,
 ) -> np.ndarray:
-    if noise is None:
-        noise = noise_of(frame)
+    noise = noise_of(frame) if noise is None else noise
+    kernel_noise(func, noise, frame)  # an error is this function's
     edges = detectEdges(src, noise=noise, **geometry) if edges is None else image8(func, "edges", edges, frame.shape)
     distance = distanceTransform((edges != 0) | (frame.valid == 0))
     minDistance = number(func, "minDistance", seeds[0], 0, above=True)

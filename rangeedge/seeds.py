@@ -10,7 +10,7 @@ from ._args import array, described, error, fail, image8, image32f, number
 
 
 def extractSeeds(
-    distance: np.ndarray, *, minDistance: float = 3.0, separation: float = 0.75, mask: np.ndarray | None = None
+    distance: np.ndarray, *, minDistance: float = 3.0, separation: float = 0.65, mask: np.ndarray | None = None
 ) -> tuple[int, np.ndarray]:
     """Markers in the middle of surfaces: the peaks of a distance map, each with the plateau around it.
 
@@ -55,14 +55,14 @@ def extractSeeds(
     Examples
     --------
     >>> distance = np.float32([[0, 1, 2, 3, 2, 1, 2, 3, 4, 3, 2, 1, 0]])
-    >>> extractSeeds(distance, minDistance=2)
+    >>> extractSeeds(distance, minDistance=2, separation=0.75)
     (3, array([[0, 0, 0, 1, 0, 0, 0, 2, 2, 2, 0, 0, 0]], dtype=int32))
     """
     return _seeds("extractSeeds", distance, minDistance, separation, mask)
 
 
 def extractSeedsWithStats(
-    distance: np.ndarray, *, minDistance: float = 3.0, separation: float = 0.75, mask: np.ndarray | None = None
+    distance: np.ndarray, *, minDistance: float = 3.0, separation: float = 0.65, mask: np.ndarray | None = None
 ) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
     """Markers in the middle of surfaces, with the extent and the centre of each.
 
@@ -91,7 +91,7 @@ def extractSeedsWithStats(
     Examples
     --------
     >>> distance = np.float32([[0, 1, 2, 3, 2, 1, 2, 3, 4, 3, 2, 1, 0]])
-    >>> _, _, stats, centroids = extractSeedsWithStats(distance, minDistance=2)
+    >>> _, _, stats, centroids = extractSeedsWithStats(distance, minDistance=2, separation=0.75)
     >>> stats[1:, cv2.CC_STAT_AREA], centroids[1:, 0]
     (array([1, 3], dtype=int32), array([3., 8.]))
     """
@@ -120,8 +120,8 @@ def _seeds(
     func: str, distance: np.ndarray, minDistance: float, separation: float, mask: np.ndarray | None
 ) -> tuple[int, np.ndarray]:
     distance = image32f(func, "distance", array(func, "distance", distance, "a real array of shape (H, W)"))
-    if distance.size >= 2**31 - 1:
-        raise error(func, f"`distance` must have fewer than 2^31 pixels, got {distance.size}", cv2.Error.StsOutOfRange)
+    if distance.size >= 2**30:
+        raise error(func, f"`distance` must have fewer than 2^30 pixels, got {distance.size}", cv2.Error.StsOutOfRange)
     if not distance.min() >= 0:  # NaN fails, too
         raise fail(func, "distance", ">= 0 everywhere", f"a least value of {distance.min():g}")
     minDistance = number(func, "minDistance", minDistance, 0, above=True)

@@ -1,0 +1,357 @@
+"""Regions: hand cases, properties, surfaces, and figures on real and rendered scenes."""
+
+import cv2
+import numpy as np
+import pytest
+
+import rangeedge
+from rangeedge.evaluation import hooverScores
+from rangeedge.noise import NoiseModel
+from rangeedge.regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
+from rangeedge.synthetic import (
+    abwCamera,
+    abwNoise,
+    curvedScene,
+    gaussianNoise,
+    kinectCamera,
+    kinectNoise,
+    perceptronCamera,
+    perceptronNoise,
+    pinholeCamera,
+    planePair,
+    polyhedraScene,
+    renderScene,
+    sphere,
+)
+
+SIGMA = 0.2
+CAMERA = pinholeCamera(np.array([[150.0, 0, 79.5], [0, 150, 59.5], [0, 0, 1]]), (160, 120))
+
+
+def noisy(depth, seed=0):
+    return depth + np.random.default_rng(seed).normal(0, SIGMA, depth.shape)
+
+
+def columns(profile, rows=80):
+    return np.tile(np.asarray(profile, float), (rows, 1))
+
+
+X = np.arange(120.0)
+ROOF = noisy(columns(np.abs(X - 60)))
+STEP = noisy(columns(np.where(X < 50, 0.0, 12.0)))
+
+
+def one_region_each(labels, *areas, share=0.98):
+    """Each area has a label of its own, on nearly all of its pixels."""
+    found = []
+    for area in areas:
+        counts = np.bincount(labels[area].ravel())
+        label = int(counts.argmax())
+        assert label > 0
+        assert counts[label] >= share * counts.sum()
+        found.append(label)
+    assert len(set(found)) == len(areas)
+
+
+def markers_at(shape, *boxes):
+    markers = np.zeros(shape, np.int32)
+    for label, (rows, cols) in enumerate(boxes, 1):
+        markers[rows, cols] = label
+    return markers
+
+
+def same_partition(a, b):
+    pairs = np.unique(np.stack([a.ravel(), b.ravel()]), axis=1)
+    return len(np.unique(pairs[0])) == len(np.unique(pairs[1])) == pairs.shape[1]
+
+
+LEFT, RIGHT = np.s_[:, :58], np.s_[:, 63:]
+
+
+class TestGrowing:
+    @pytest.mark.parametrize("slope", [0.3, 1.0, 3.0])
+    def test_roof(self, slope):
+        src = noisy(columns(slope * np.abs(X - 60)))
+        markers = markers_at(src.shape, (slice(30, 50), slice(20, 40)), (slice(30, 50), slice(80, 100)))
+        labels = growRegions(src, markers, noise=SIGMA)
+        one_region_each(labels, LEFT, RIGHT)
+        assert labels.dtype == np.int32
+        assert labels.max() == 2
+
+    def test_step_without_edges_is_not_crossed(self):
+        labels = growRegions(STEP, markers_at(STEP.shape, (slice(30, 50), slice(10, 30))), noise=SIGMA)
+        assert (labels[:, :50] == 1).all()
+        assert not labels[:, 51:].any()
+
+    def test_edges_are_not_crossed(self):
+        src = noisy(columns(0.2 * X))
+        edges = np.zeros(src.shape, np.uint8)
+        edges[:, 60] = 255
+        labels = growRegions(src, markers_at(src.shape, (slice(30, 50), slice(10, 30))), edges=edges, noise=SIGMA)
+        assert labels[:, :60].all()
+        free = growRegions(src, markers_at(src.shape, (slice(30, 50), slice(10, 30))), noise=SIGMA)
+        assert free.all()
+
+    def test_markers_of_one_plane_merge(self):
+        src = noisy(columns(0.5 * X))
+        markers = markers_at(src.shape, (slice(0, 20), slice(0, 20)), (slice(60, 80), slice(90, 120)))
+        assert (growRegions(src, markers, noise=SIGMA) == 1).all()
+
+    def test_marker_on_two_planes_is_cut(self):
+        markers = np.zeros(ROOF.shape, np.int32)
+        markers[20:60, 35:85] = 1
+        one_region_each(growRegions(ROOF, markers, noise=SIGMA), LEFT, RIGHT)
+
+    def test_leak_through_a_gap_is_cut(self):
+        src = noisy(columns(0.35 * np.abs(X - 60)))
+        edges = np.zeros(src.shape, np.uint8)
+        edges[:, 60] = 255
+        edges[30:50, 60] = 0
+        markers = markers_at(src.shape, (slice(30, 50), slice(20, 40)))
+        one_region_each(growRegions(src, markers, edges=edges, noise=SIGMA, newSeeds=True), LEFT, RIGHT)
+
+    def test_curved_surface_is_one_region(self):
+        src = noisy(columns(0.02 * (X - 60) ** 2))
+        markers = markers_at(src.shape, (slice(30, 50), slice(10, 25)), (slice(30, 50), slice(55, 70)))
+        assert (growRegions(src, markers, noise=SIGMA, newSeeds=True) == 1).mean() > 0.99
+
+    def test_new_seeds_reach_what_markers_do_not(self):
+        markers = markers_at(STEP.shape, (slice(30, 50), slice(10, 30)))
+        one_region_each(growRegions(STEP, markers, noise=SIGMA, newSeeds=True), np.s_[:, :50], np.s_[:, 50:])
+
+    def test_no_markers(self):
+        assert not growRegions(STEP, np.zeros(STEP.shape, np.int32)).any()
+
+    def test_negative_markers_are_none(self):
+        assert not growRegions(STEP, np.full(STEP.shape, -1, np.int32)).any()
+
+    def test_outliers_fit_nothing(self):
+        src = STEP.copy()
+        src[10:14, 10:14] += np.arange(16).reshape(4, 4) * 7 + 50
+        labels = growRegions(src, markers_at(src.shape, (slice(30, 50), slice(10, 30))), noise=SIGMA, newSeeds=True)
+        assert not labels[10:14, 10:14].any()
+
+    def test_small_regions_fall_away(self):
+        src = STEP.copy()
+        src[20:29, 20:29] += 30  # 81 pixels
+        markers = markers_at(src.shape, (slice(50, 70), slice(10, 30)), (slice(22, 27), slice(22, 27)))
+        assert growRegions(src, markers, noise=SIGMA, minArea=50)[24, 24] > 0
+        assert growRegions(src, markers, noise=SIGMA, minArea=100)[24, 24] == 0
+
+    def test_invalid_pixels_have_no_label(self):
+        src = ROOF.copy()
+        src[:, 30:34] = np.nan
+        labels = segmentRegions(src, noise=SIGMA)
+        assert not labels[:, 30:34].any()
+        assert labels[np.isfinite(src)].all()
+
+
+class TestSegmentation:
+    def test_step_and_roof(self):
+        one_region_each(segmentRegions(STEP), np.s_[:, :50], np.s_[:, 50:])
+        one_region_each(segmentRegions(ROOF), LEFT, RIGHT)
+
+    def test_no_data(self):
+        assert not segmentRegions(np.full((20, 30), np.nan)).any()
+        assert not segmentRegions(np.zeros((20, 30), np.uint16), K=np.eye(3)).any()
+
+    def test_without_noise(self):
+        one_region_each(segmentRegions(columns(np.abs(X - 60))), LEFT, RIGHT)
+        assert (segmentRegions(np.ones((30, 40))) == 1).all()
+
+    def test_regions_are_connected_and_in_raster_order(self):
+        scan = kinectNoise(renderScene(polyhedraScene(3, kinectCamera()), kinectCamera()), seed=3)
+        labels = segmentRegions(scan.src, **scan.geometry)
+        assert not labels[scan.src == 0].any()
+        names, first = np.unique(labels, return_index=True)
+        assert names.tolist() == list(range(labels.max() + 1))
+        assert (np.diff(first[1:]) > 0).all()
+        for k in names[1:]:
+            assert cv2.connectedComponents((labels == k).view(np.uint8), connectivity=4)[0] == 2
+
+    def test_deterministic_for_any_number_of_threads(self):
+        threads = cv2.getNumThreads()
+        results = []
+        try:
+            for n in (1, 2, 3):
+                cv2.setNumThreads(n)
+                results.append(segmentRegions(ROOF))
+        finally:
+            cv2.setNumThreads(threads)
+        assert all(np.array_equal(results[0], r) for r in results)
+
+    def test_integers_as_floats(self):
+        pair = planePair((0.5, 0, -1), (-0.5, 0, -1), point=(0, 0, 1))
+        millimetres = kinectNoise(renderScene(pair, CAMERA), seed=1, holes=0).src
+        metres = np.where(millimetres > 0, millimetres / np.float32(1000), np.nan).astype(np.float32)
+        K = CAMERA.geometry["K"]
+        expected = segmentRegions(millimetres, K=K)
+        assert expected.max() == 2
+        assert np.array_equal(segmentRegions(metres, K=K), expected)
+
+    def test_mask(self):
+        mask = np.ones(ROOF.shape, bool)
+        mask[:, :20] = False
+        masked = np.where(mask, ROOF, np.nan)
+        labels = segmentRegions(ROOF, mask=mask, noise=SIGMA)
+        assert not labels[~mask].any()
+        assert np.array_equal(labels, segmentRegions(masked, noise=SIGMA))
+
+    def test_height_map_is_negative_depth(self):
+        assert np.array_equal(segmentRegions(-ROOF, heightMap=True), segmentRegions(ROOF))
+
+    def test_unit_does_not_matter(self):
+        expected = segmentRegions(ROOF, noise=SIGMA)
+        assert np.array_equal(segmentRegions(1024 * ROOF, pixelSize=1024, noise=1024 * SIGMA), expected)
+        assert np.array_equal(segmentRegions(ROOF, noise=NoiseModel(a=SIGMA)), expected)
+
+    @pytest.mark.parametrize("turn", [np.fliplr, np.flipud, np.transpose], ids=["fliplr", "flipud", "transpose"])
+    def test_symmetric_up_to_ties(self, turn):
+        edges = np.zeros(ROOF.shape, np.uint8)
+        edges[:, 60] = 255
+        expected = turn(segmentRegions(ROOF, noise=SIGMA, edges=edges))
+        found = segmentRegions(np.ascontiguousarray(turn(ROOF)), noise=SIGMA, edges=np.ascontiguousarray(turn(edges)))
+        agreeing = turn(edges) == 0
+        assert same_partition(found[agreeing], expected[agreeing])
+
+    def test_inputs_untouched_and_any_layout(self):
+        src = np.asfortranarray(ROOF)
+        before = src.copy()
+        assert np.array_equal(segmentRegions(src), segmentRegions(ROOF))
+        assert np.array_equal(src, before)
+        assert np.array_equal(segmentRegions(np.repeat(ROOF, 2, axis=1)[:, ::2]), segmentRegions(ROOF))
+
+    def test_points_as_depth(self):
+        rendering = renderScene(planePair((0.5, 0, -1), (-0.5, 0.2, -1), point=(0, 0, 1)), CAMERA)
+        depth = gaussianNoise(rendering, 0.002, seed=1)
+        (u, v), z, K = np.meshgrid(np.arange(160), np.arange(120)), depth.src, depth.geometry["K"]
+        points = np.stack([(u - K[0, 2]) * z / K[0, 0], (v - K[1, 2]) * z / K[1, 1], z], axis=-1)
+        truth = rendering.labels
+        for labels in (segmentRegions(depth.src, **depth.geometry), segmentRegions(points.astype(np.float32))):
+            assert hooverScores(labels, truth).correct == truth.max() == labels.max()
+
+
+class TestSurfaces:
+    def test_planes(self):
+        rendering = renderScene(planePair((0.5, 0, -1), (-0.5, 0.2, -1), point=(0, 0, 1)), CAMERA)
+        K = rendering.camera.geometry["K"]
+        scan = gaussianNoise(rendering, 0.002, seed=1)
+        count, labels, stats, centroids, surfaces = segmentRegionsWithStats(scan.src, K=K)
+        assert count == len(stats) == len(centroids) == len(surfaces) == 3
+        assert np.array_equal(stats[:, cv2.CC_STAT_AREA], np.bincount(labels.ravel(), minlength=3))
+        for k in (1, 2):
+            inside = labels == k
+            expected = rendering.normals[inside].mean(axis=0)
+            s = surfaces[k]
+            assert not s["curved"]
+            assert s["normal"] @ expected > np.cos(np.radians(1.0)) * np.linalg.norm(expected)
+            assert np.allclose(s["quadric"][:6], 0)
+            points = rendering.points[inside]
+            assert np.abs(points @ s["quadric"][6:9] + s["quadric"][9]).mean() < 0.001
+            assert 0.001 < s["rms"] < 0.003
+            assert np.allclose(centroids[k], np.argwhere(inside)[:, ::-1].mean(axis=0))
+
+    def test_sphere(self):
+        rendering = renderScene([sphere((0.05, 0, 1.0), 0.3)], CAMERA)
+        scan = gaussianNoise(rendering, 0.001, seed=1)
+        markers = np.zeros(rendering.depth.shape, np.int32)
+        markers[50:70, 75:95] = 1
+        count, labels, _, _, surfaces = growRegionsWithStats(scan.src, markers, newSeeds=True, **scan.geometry)
+        assert count == 2
+        assert (labels > 0).sum() > 0.95 * np.isfinite(scan.src).sum()
+        q = surfaces["quadric"][1]
+        assert surfaces["curved"][1]
+        assert np.allclose(q[1:3] / q[0], 1, atol=0.1)
+        assert np.allclose(-q[6:9] / (2 * q[:3]), (0.05, 0, 1.0), atol=0.02)
+        assert surfaces["rms"][1] < 0.003
+
+    def test_height_map_and_grid(self):
+        height = noisy(columns(0.5 * X))
+        _, _, _, _, surfaces = segmentRegionsWithStats(height, heightMap=True, pixelSize=(2.0, 1.0), noise=SIGMA)
+        normal = np.array([-0.25, 0, 1]) / np.hypot(0.25, 1)
+        assert np.allclose(surfaces["normal"][1], normal, atol=1e-3)
+        _, _, _, _, surfaces = segmentRegionsWithStats(height, pixelSize=(2.0, 1.0), noise=SIGMA)
+        assert np.allclose(surfaces["normal"][1], (0.25 / np.hypot(0.25, 1), 0, -1 / np.hypot(0.25, 1)), atol=1e-3)
+
+    def test_nothing(self):
+        count, labels, stats, centroids, surfaces = segmentRegionsWithStats(np.full((5, 6), np.nan))
+        assert (count, len(stats), len(centroids), len(surfaces)) == (1, 1, 1, 1)
+        assert not labels.any()
+        assert surfaces["rms"][0] == 0
+
+
+def scores(scene, camera, noise, seeds):
+    """Summed over scenes; true parts of which the scanner sees fewer than 100 pixels are left out."""
+    total = []
+    for seed in seeds:
+        rendering = renderScene(scene(seed, camera), camera)
+        scan = noise(rendering, seed=seed)
+        seen = np.isfinite(scan.src[..., 2]) if scan.src.ndim == 3 else scan.src > 0
+        truth = np.where(seen, rendering.labels, 0)
+        truth[(np.bincount(truth.ravel()) < 100)[truth]] = 0
+        total.append(hooverScores(segmentRegions(scan.src, **scan.geometry), truth, ignore=truth == 0))
+    return sum(total[1:], total[0])
+
+
+@pytest.mark.parametrize(
+    ("camera", "noise"),
+    [(abwCamera(), abwNoise), (perceptronCamera(), perceptronNoise), (kinectCamera(), kinectNoise)],
+    ids=["abw", "perceptron", "kinect"],
+)
+class TestRenderedScenes:
+    def test_polyhedra(self, camera, noise):
+        s = scores(polyhedraScene, camera, noise, [11])
+        assert s.correct >= 0.9 * s.truth
+        assert s.under <= 1
+        assert s.noise <= 1
+
+    def test_curved(self, camera, noise):
+        s = scores(curvedScene, camera, noise, [11])
+        assert s.correct >= 0.7 * s.truth
+
+
+def test_real_faces(load, score):
+    counts = []
+    for name in load.mosd_faces_names(complete=True)[:4]:
+        frame = load.mosd_faces(name)
+        labels = segmentRegions(frame["z"], K=score.matrix(frame["K"]))
+        ignored = ~np.isfinite(frame["z"]) | (frame["label"] == 0)
+        counts.append(score.hoover(labels, frame["label"], ignore=ignored))
+    total = {k: sum(c[k] for c in counts) for k in counts[0]}
+    assert total["correct"] >= 0.85 * total["truth"]
+    assert total["noise"] <= 2
+    assert total["under"] <= 1
+
+
+BAD_FIELDS = [
+    ({"tolerance": 0.0}, "tolerance"),
+    ({"smoothAngle": 31}, "smoothAngle"),
+    ({"minArea": 0}, "minArea"),
+    ({"minArea": 1.5}, "minArea"),
+    ({"noise": -1.0}, "noise"),
+    ({"noise": np.ones((3, 3))}, "noise"),
+    ({"edges": np.zeros((3, 3), np.uint8)}, "edges"),
+    ({"mask": np.zeros((3, 3), np.uint8)}, "mask"),
+    ({"K": np.zeros((2, 2))}, "K"),
+]
+
+
+@pytest.mark.parametrize(
+    ("options", "name"), [*BAD_FIELDS, ({"minDistance": 0}, "minDistance"), ({"separation": 1}, "separation")]
+)
+def test_errors_of_segmentation(options, name):
+    for function in (segmentRegions, segmentRegionsWithStats):
+        with pytest.raises(rangeedge.error, match=f"{function.__name__}: `{name}`"):
+            function(np.ones((20, 30), np.float32), **options)
+
+
+@pytest.mark.parametrize(
+    ("options", "name"),
+    [*BAD_FIELDS, ({"newSeeds": 1}, "newSeeds"), ({"markers": np.zeros((20, 30))}, "markers"),
+     ({"markers": np.zeros((20, 31), np.int32)}, "markers"), ({"src": [[1.0]]}, "src")],
+)  # fmt: skip
+def test_errors_of_growing(options, name):
+    arguments = {"src": np.ones((20, 30), np.float32), "markers": np.zeros((20, 30), np.int32)} | options
+    for function in (growRegions, growRegionsWithStats):
+        with pytest.raises(rangeedge.error, match=f"{function.__name__}: `{name}`"):
+            function(**arguments)
