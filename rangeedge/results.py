@@ -17,14 +17,15 @@ import cv2
 import numpy as np
 
 from ._args import described, error
-from ._constants import EDGE_OCCLUDING
+from .detector import selected_of
 from .distance import distanceTransform
 from .draw import drawOverview
 from .edges import EdgeStrength, frame_of, params_of, points_of, strength_of
 from .geometry import RangeFrame
 from .noise import noise_of
-from .selection import selectEdges
 from .thinning import thinEdges
+
+SELECTION = ("jumpThreshold", "creaseThreshold", "hysteresis", "minLength", "dynamic")
 
 EDGE_FILES = {
     "overview.png": "everything in one picture",
@@ -59,36 +60,18 @@ class EdgeResults(NamedTuple):
         return -depth if self.heightMap else depth
 
 
-def find_edges(
-    src: np.ndarray,
-    *,
-    jumpThreshold: float | None = None,
-    creaseThreshold: float = 30.0,
-    eps: float | None = None,
-    mask: np.ndarray | None = None,
-    hysteresis: float = 1.0,
-    minLength: int = 6,
-    dynamic: bool = False,
-    **options: Any,
-) -> EdgeResults:
+def find_edges(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> EdgeResults:
     """What `detectEdges` returns, with all that it computes on the way."""
-    params = params_of("detectEdges", eps, options)
-    frame = frame_of("detectEdges", src, params, mask)
+    func = "detectEdges"
+    selection = {name: options.pop(name) for name in SELECTION if name in options}
+    params = params_of(func, options.pop("eps", None), options)
+    frame = frame_of(func, src, params, mask)
     if params.noise is None:
         params = dataclasses.replace(params, noise=noise_of(frame))
-    strength = strength_of("detectEdges", frame, params)
-    jump = np.where(strength.kind & EDGE_OCCLUDING, strength.jump, np.float32(0))
-    edges = selectEdges(
-        jump,
-        strength.crease,
-        jumpThreshold or 0.0,
-        creaseThreshold,
-        hysteresis=hysteresis,
-        minLength=minLength,
-        dynamic=dynamic,
-    )
+    strength = strength_of(func, frame, params)
+    edges = selected_of(func, strength, **selection)
     thin = thinEdges(edges)
-    points = points_of("detectEdges", frame, params)
+    points = points_of(func, frame, params)
     return EdgeResults(frame, params.noise, params.heightMap, strength, points, edges, thin, distanceTransform(thin))
 
 
