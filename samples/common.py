@@ -52,16 +52,17 @@ def relief(src, geometry):
     return rangeedge.drawEdges(src, nothing, **view)
 
 
-def beside(*panels):
-    """Pictures side by side, each under its title."""
+def sheet(*panels, columns=2):
+    """Pictures of one size in a grid, each under its title."""
     cells = []
     for title, picture in panels:
         if picture.ndim == 2:
             picture = cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR)
         bar = np.full((30, picture.shape[1], 3), 32, np.uint8)
         cv2.putText(bar, title, (6, 21), cv2.FONT_HERSHEY_SIMPLEX, 0.55, (235, 235, 235), 1, cv2.LINE_AA)
-        cells.append(np.pad(np.vstack([bar, picture]), ((0, 0), (0, 4), (0, 0)), constant_values=32))
-    return np.hstack(cells)
+        cells.append(cv2.copyMakeBorder(np.vstack([bar, picture]), 0, 4, 0, 4, cv2.BORDER_CONSTANT, value=(32, 32, 32)))
+    cells += [np.full_like(cells[0], 32)] * (-len(cells) % columns)
+    return np.vstack([np.hstack(cells[i : i + columns]) for i in range(0, len(cells), columns)])
 
 
 def write(folder, name, picture):

@@ -1,10 +1,11 @@
 """How far every pixel is from the nearest edge, and which edge that is.
 
-    python samples/distance_map.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
+python samples/distance_map.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
 """
 
+import cv2
 import numpy as np
-from common import beside, load, parser, write
+from common import load, parser, sheet, write
 
 import rangeedge
 
@@ -20,7 +21,7 @@ def main(argv=None):
     write(
         args.out,
         "distance_map.png",
-        beside(
+        sheet(
             ("distance to the nearest edge, a line every 10 pixels", contoured(distance)),
             ("direction to the nearest edge", directions(nearest)),
         ),
@@ -39,12 +40,13 @@ def contoured(distance):
 
 def directions(nearest):
     """Hue by the direction to the nearest edge, as optical flow is shown."""
-    import cv2
-
     y, x = np.indices(nearest.shape, np.float32)
     to_y, to_x = np.unravel_index(np.maximum(nearest, 0), nearest.shape)
     angle = cv2.phase(to_x - x, to_y - y, angleInDegrees=True) / 2
-    hsv = cv2.merge([angle.astype(np.uint8), np.full(nearest.shape, 130, np.uint8), np.full(nearest.shape, 230, np.uint8)])
+    half, full = (np.full(nearest.shape, level, np.uint8) for level in (130, 230))
+    hsv = cv2.merge([angle.astype(np.uint8), half, full])
+        [angle.astype(np.uint8), np.full(nearest.shape, 130, np.uint8), np.full(nearest.shape, 230, np.uint8)]
+    )
     picture = cv2.cvtColor(hsv, cv2.COLOR_HSV2BGR)
     picture[nearest == np.arange(nearest.size).reshape(nearest.shape)] = 0
     return picture

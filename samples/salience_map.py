@@ -7,7 +7,7 @@ border of a box; weighted by salience they hardly show.
 """
 
 import numpy as np
-from common import beside, load, parser, write
+from common import load, parser, sheet, write
 
 import rangeedge
 
@@ -19,7 +19,8 @@ def main(argv=None):
     # With minSignificance=3 noise gets through: the worst case for a distance map.
     strength = rangeedge.edgeStrength(src, minSignificance=3, **geometry)
     jumps = strength.jump[strength.jump > 0]
-    salience = rangeedge.overallStrength(strength.jump, strength.crease, np.median(jumps) if jumps.size else 1)
+    jumpCut = np.percentile(jumps, 25) if jumps.size else 1.0
+    salience = rangeedge.overallStrength(strength.jump, strength.crease, jumpCut)
     print(f"{np.count_nonzero(salience)} candidates")
 
     plain = rangeedge.distanceTransform(salience)
@@ -28,7 +29,7 @@ def main(argv=None):
     write(
         args.out,
         "salience_map.png",
-        beside(
+        sheet(
             ("salience of all candidates", salience),
             ("distance", rangeedge.colorizeDistance(plain, log=True)),
             ("salience distance, multiplicative", rangeedge.colorizeDistance(weighted, log=True)),

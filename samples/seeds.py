@@ -7,7 +7,7 @@
 
 import cv2
 import numpy as np
-from common import beside, load, parser, relief, write
+from common import load, parser, relief, sheet, write
 
 import rangeedge
 
@@ -27,7 +27,7 @@ def main(argv=None):
     write(
         args.out,
         "seeds.png",
-        beside(("distance to the edges", rangeedge.colorizeDistance(distance)), (f"{count - 1} seeds", picture)),
+        sheet(("distance to the edges", rangeedge.colorizeDistance(distance)), (f"{count - 1} seeds", picture)),
     )
     write(args.out, "seeds.tiff", markers)
 

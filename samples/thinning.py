@@ -1,11 +1,11 @@
 """Edge maps one pixel wide, by the three methods of rangeedge.thinEdges.
 
-    python samples/thinning.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
+python samples/thinning.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
 """
 
 import cv2
 import numpy as np
-from common import beside, load, parser, write
+from common import load, parser, sheet, write
 
 import rangeedge
 
@@ -30,14 +30,15 @@ def main(argv=None):
         panels.append((name, thin))
         print(f"{np.count_nonzero(thin)} after {name}")
     window = busiest_window(edges)
-    write(args.out, "thinning.png", beside(*((title, enlarged(edges, picture, window)) for title, picture in panels)))
+    write(args.out, "thinning.png", sheet(*((title, enlarged(edges, picture, window)) for title, picture in panels)))
 
 
 def busiest_window(edges, width=120, height=100):
     """Where most edges are."""
     height, width = min(height, edges.shape[0]), min(width, edges.shape[1])
     density = cv2.boxFilter(edges, cv2.CV_32F, (width, height), anchor=(0, 0), borderType=cv2.BORDER_CONSTANT)
-    y, x = np.unravel_index(density[: edges.shape[0] - height + 1, : edges.shape[1] - width + 1].argmax(), density.shape)
+    density = density[: edges.shape[0] - height + 1, : edges.shape[1] - width + 1]
+    y, x = np.unravel_index(density.argmax(), density.shape)
     return slice(y, y + height), slice(x, x + width)
 
 
