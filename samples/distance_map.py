@@ -45,8 +45,6 @@ def directions(nearest):
     angle = cv2.phase(to_x - x, to_y - y, angleInDegrees=True) / 2
     half, full = (np.full(nearest.shape, level, np.uint8) for level in (130, 230))
     hsv = cv2.merge([angle.astype(np.uint8), half, full])
-        [angle.astype(np.uint8), np.full(nearest.shape, 130, np.uint8), np.full(nearest.shape, 230, np.uint8)]
-    )
     picture = cv2.cvtColor(hsv, cv2.COLOR_HSV2BGR)
     picture[nearest == np.arange(nearest.size).reshape(nearest.shape)] = 0
     return picture
