@@ -41,6 +41,7 @@ from .results import (
     GEOMETRY,
     GROWING,
     REGION_FILES,
+    SEEDING,
     EdgeResults,
     edge_files,
     find_edges,
@@ -215,7 +216,8 @@ def _add_growing(parser: argparse.ArgumentParser) -> None:
     texts = {**_documented(extractSeeds), **_documented(growRegions)}
     for name in GROWING:
         default = inspect.signature(segmentRegions).parameters[name].default
-        _add_option(group, name, type(default), f"{texts.get(name, '')} (default: {default:g})")
+        text = f"{'Seeds: ' if name in SEEDING else ''}{texts.get(name, '')} (default: {default:g})"
+        _add_option(group, name, type(default), text)
 
 
 def _add_field(group: Any, name: str) -> None:
@@ -373,6 +375,7 @@ def _demo(args: argparse.Namespace) -> int:
     _say_found(scene.title, found)
     print(scene.score(found))
     _say_written(args.out, {**EDGE_FILES, **scene.descriptions})
+    print(f"Now for its surfaces: rangeedge segment {args.out / 'scene.npz'} --out regions")
     return 0
 
 

@@ -499,7 +499,10 @@ def _sheet(panels: list[tuple[str, np.ndarray]], title: str | None) -> np.ndarra
     width = max(width, *(_text_width(caption) for caption, _ in panels))
     cells = [_cell(caption, picture, width) for caption, picture in panels]
     height, width = cells[0].shape[:2]
-    columns = min((1, 2, 3, 6), key=lambda n: abs(np.log(n * width / (-(-len(cells) // n) * height) * 9 / 16)))
+    columns = min(
+        (1, 2, 4) if len(cells) == 4 else (1, 2, 3, 6),
+        key=lambda n: abs(np.log(n * width / (-(-len(cells) // n) * height) * 9 / 16)),
+    )
     cells += [np.full_like(cells[0], _BACKGROUND)] * (-len(cells) % columns)
     rows = [np.hstack(cells[i : i + columns]) for i in range(0, len(cells), columns)]
     top = [] if title is None else [_bar(title, rows[0].shape[1])]

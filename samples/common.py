@@ -45,6 +45,15 @@ def built_in_scene():
     return scan.src, scan.geometry
 
 
+def gaps(src, geometry):
+    """8-bit map of where there is no data, apart from single pixels: surfaces end there as they do at edges."""
+    depth = src if src.ndim == 2 else src[..., 2]
+    missing = ~np.isfinite(depth)
+    if depth.dtype.kind == "u" or "K" in geometry:
+        missing |= depth == 0
+    return cv2.morphologyEx(255 * missing.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
+
+
 def relief(src, geometry):
     """The range image as a shaded picture to draw on."""
     nothing = np.zeros(src.shape[:2], np.uint8)

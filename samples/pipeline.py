@@ -27,7 +27,7 @@ class Candidate(NamedTuple):
 
 
 def candidates(depth, K, cup=0.015, unevenness=0.003):
-    """Places for a suction cup of radius `cup` where the surface is even; those with most room first."""
+    """Places for a suction cup of radius `cup` where the surface is even; the nearest first."""
     labels = rangeedge.segmentRegions(depth, K=K)
     labels = cv2.medianBlur(labels.astype(np.uint16), 5)  # pixels without data here and there do no harm
     inside = (cv2.dilate(labels, np.ones((3, 3))) == labels) & (cv2.erode(labels, np.ones((3, 3))) == labels)
@@ -41,7 +41,7 @@ def candidates(depth, K, cup=0.015, unevenness=0.003):
         if distance[y, x] * pixel >= cup and cup >= 3 * pixel:
             center, normal, spread = place_at(points, x, y, cup / pixel)
             found.append(Candidate(center, normal, distance[y, x] * pixel, spread))
-    return sorted((c for c in found if c.unevenness <= unevenness), key=lambda c: c.free, reverse=True)
+    return sorted((c for c in found if c.unevenness <= unevenness), key=lambda c: c.center[2])
 
 
 def points_of(depth, K):
@@ -64,7 +64,7 @@ def place_at(points, x, y, radius):
 
 
 def draw(picture, found, K, cup):
-    """Cups as they would sit on the surfaces, with their normals, numbered from the best."""
+    """Cups as they would sit on the surfaces, with their normals, numbered from the nearest."""
     for rank, place in enumerate(found, 1):
         side = np.cross(place.normal, (0, 1, 0))
         side /= np.linalg.norm(side)

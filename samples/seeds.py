@@ -7,7 +7,7 @@
 
 import cv2
 import numpy as np
-from common import load, parser, relief, sheet, write
+from common import gaps, load, parser, relief, sheet, write
 
 import rangeedge
 
@@ -17,7 +17,7 @@ def main(argv=None):
     src, geometry = load(args)
 
     edges = rangeedge.detectEdges(src, **geometry)
-    distance = rangeedge.distanceTransform(edges)
+    distance = rangeedge.distanceTransform(edges | gaps(src, geometry))
     count, markers, stats, centroids = rangeedge.extractSeedsWithStats(distance, minDistance=4)
     print(f"{count - 1} seeds, of {stats[1:, cv2.CC_STAT_AREA].min(initial=edges.size)} pixels or more")
 
@@ -27,7 +27,7 @@ def main(argv=None):
     write(
         args.out,
         "seeds.png",
-        sheet(("distance to the edges", rangeedge.colorizeDistance(distance)), (f"{count - 1} seeds", picture)),
+        sheet(("distance to edges and gaps", rangeedge.colorizeDistance(distance)), (f"{count - 1} seeds", picture)),
     )
     write(args.out, "seeds.tiff", markers)
 

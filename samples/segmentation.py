@@ -9,7 +9,7 @@ one surface.
 
 import cv2
 import numpy as np
-from common import load, parser, relief, sheet, write
+from common import gaps, load, parser, relief, sheet, write
 from skimage.segmentation import watershed
 
 import rangeedge
@@ -21,15 +21,17 @@ def main(argv=None):
 
     strength = rangeedge.edgeStrength(src, **geometry)
     edges = rangeedge.detectEdges(src, **geometry)
-    distance = rangeedge.distanceTransform(edges)
+    missing = gaps(src, geometry)
+    distance = rangeedge.distanceTransform(edges | missing)
     count, markers = rangeedge.extractSeeds(distance, minDistance=4)
 
     grown = rangeedge.growRegions(src, markers, edges=edges, **geometry)
 
     # cv2.watershed floods over differences of colour: a picture that is flat but for its edges.
-    by_opencv = cv2.watershed(cv2.cvtColor(edges, cv2.COLOR_GRAY2BGR), markers.copy())
+    by_opencv = cv2.watershed(cv2.cvtColor(edges | missing, cv2.COLOR_GRAY2BGR), markers.copy())
+    by_opencv[missing > 0] = 0
 
-    by_skimage = watershed(-distance, markers).astype(np.int32)
+    by_skimage = watershed(-distance, markers, mask=missing == 0).astype(np.int32)
 
     view = relief(src, geometry)
     panels = [(f"{count - 1} seeds", markers), ("rangeedge.growRegions", grown)]
