@@ -3,7 +3,18 @@
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+try:
+    from . import _core  # noqa: F401
+except ImportError as reason:
+    if not (Path(__file__).parent / "core").exists():
+        raise
+    raise ImportError(
+        "this is the source folder of rangeedge, where nothing is compiled: start Python in another folder to use the "
+        "installed package, or install this one by `pip install -e .`"
+    ) from reason
 
 from ._args import error
 from ._constants import (

@@ -8,6 +8,7 @@ import inspect
 import json
 import pkgutil
 import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -132,6 +133,15 @@ def test_functions_are_documented_with_their_call_form(name):
 def test_import_warns_of_nothing():
     isolated("import rangeedge", "-W", "error")
     isolated("import runpy; runpy.run_module('rangeedge.optimality', run_name='other')", "-W", "error")
+
+
+def test_source_folder_without_the_compiled_module_says_so(tmp_path):
+    source = tmp_path / "rangeedge"
+    (source / "core").mkdir(parents=True)
+    shutil.copy(PACKAGE / "__init__.py", source)
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import rangeedge"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "ImportError: this is the source folder of rangeedge" in run.stderr
 
 
 def test_import_is_quick_and_leaves_scikit_image_for_later():
