@@ -3,7 +3,18 @@
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+try:
+    from . import _core  # noqa: F401
+except ImportError as reason:
+    if not (Path(__file__).parent / "core").exists():
+        raise
+    raise ImportError(
+        "this is the source folder of rangeedge, where nothing is compiled: start Python in another folder to use the "
+        "installed package, or install this one by `pip install -e .`"
+    ) from reason
 
 from ._args import error
 from ._constants import (
@@ -30,6 +41,7 @@ from ._constants import (
     THIN_LEE,
     THIN_SKELETON,
 )
+from .closure import closeContours
 from .detector import ScanLineDetector, createScanLineDetector, detectEdges
 from .distance import (
     distanceTransform,
@@ -41,11 +53,13 @@ from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
 from .edges import EdgeStrength, ScanLineParams, edgePoints, edgeStrength, splitScanLine
 from .io import RangeImage, imreadRange, imwriteRange
 from .noise import NoiseModel, estimateNoise
+from .regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
 from .seeds import extractSeeds, extractSeedsWithStats
 from .selection import overallStrength, selectEdges, strengthImage
 from .thinning import thinEdges
 
 if TYPE_CHECKING:
+    from . import batch as batch
     from . import evaluation as evaluation
     from . import optimality as optimality
     from . import synthetic as synthetic
@@ -72,12 +86,17 @@ __all__ = [  # noqa: RUF022
     "detectEdges",
     "ScanLineDetector",
     "createScanLineDetector",
+    "closeContours",
     "distanceTransform",
     "distanceTransformWithLabels",
     "salienceDistanceTransform",
     "salienceDistanceTransformWithLabels",
     "extractSeeds",
     "extractSeedsWithStats",
+    "growRegions",
+    "growRegionsWithStats",
+    "segmentRegions",
+    "segmentRegionsWithStats",
     "drawEdges",
     "drawRegions",
     "colorizeDistance",
@@ -106,7 +125,7 @@ __all__ = [  # noqa: RUF022
     "SALIENCE_ADDITIVE",
 ]
 
-_SUBMODULES = ("evaluation", "optimality", "synthetic")  # imported when first asked for
+_SUBMODULES = ("batch", "evaluation", "optimality", "synthetic")  # imported when first asked for
 
 if not TYPE_CHECKING:
 

@@ -125,6 +125,19 @@ private:
     int direction_;
 };
 
+template <class T>
+Pixels pixels_of(const RangeImage<T>& image) {
+    const auto count = static_cast<std::size_t>(image.rows) * static_cast<std::size_t>(image.cols);
+    Pixels pixels{image.rows, image.cols, std::vector<std::uint8_t>(count)};
+    for (std::size_t i = 0; i < count; ++i) {
+        T value = image.ordinate ? image.ordinate[i] : T(0);
+        if (image.points)
+            for (std::size_t k = 0; k < 3; ++k) value += image.points[3 * i + k];
+        pixels.valid[i] = std::isfinite(value);
+    }
+    return pixels;
+}
+
 }  // namespace
 
 template <class T>
@@ -151,7 +164,7 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
             s.found.clear();
         }
     }
-    pool(candidates, image.rows, image.cols, image.projective, parameters);
+    pool(candidates, pixels_of(image), image.projective, parameters);
     return candidates;
 }
 

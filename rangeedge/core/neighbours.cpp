@@ -128,8 +128,8 @@ Step step_of(const Candidate& c) {
     return {c.direction == 2 ? 0 : 1, c.direction == 1 ? 0 : c.direction == 4 ? -1 : 1};
 }
 
-// Moves a crease along its scan line onto the line it has in common with its neighbours.
-void align(const Grid& grid, const Candidate& c, int rows, int cols, double max_shift, Candidate& moved) {
+// Moves a crease along its scan line onto the line it has in common with its neighbours, unless that leads off the data.
+void align(const Grid& grid, const Candidate& c, const Pixels& pixels, double max_shift, Candidate& moved) {
     if ((c.kind & jump_bit) || !(c.crease > 0)) return;
     const CommonLine line = common_line(grid, c);
     const Step step = step_of(c);
@@ -140,11 +140,11 @@ void align(const Grid& grid, const Candidate& c, int rows, int cols, double max_
     const double x = static_cast<double>(c.x) + shift * step.dcol, y = static_cast<double>(c.y) + shift * step.drow;
     const int u = static_cast<int>(step.dcol ? std::floor(x) : std::round(x));
     const int v = static_cast<int>(step.drow > 0 ? std::floor(y) : step.drow < 0 ? std::ceil(y) : std::round(y));
-    if (u < 0 || v < 0 || u >= cols || v >= rows || u + step.dcol >= cols || v + step.drow < 0 || v + step.drow >= rows) return;
+    if (!pixels.valid_at(u, v) || !pixels.valid_at(u + step.dcol, v + step.drow)) return;
     moved.x = static_cast<float>(x);
     moved.y = static_cast<float>(y);
-    moved.before = v * cols + u;
-    moved.after = (v + step.drow) * cols + u + step.dcol;
+    moved.before = v * pixels.cols + u;
+    moved.after = (v + step.drow) * pixels.cols + u + step.dcol;
 }
 
 // The angle between the two surfaces that meet at c, in degrees; negative where its neighbours do not fix it.
@@ -173,13 +173,13 @@ double normal_angle(const Grid& grid, const Candidate& c, bool projective) {
 
 }  // namespace
 
-void pool(std::vector<Candidate>& candidates, int rows, int cols, bool projective, const Parameters& parameters) {
+void pool(std::vector<Candidate>& candidates, const Pixels& pixels, bool projective, const Parameters& parameters) {
     const auto least = static_cast<float>(parameters.min_significance);
     if (!(least > 0) && !parameters.normals) return;
     std::vector<Candidate> kept(candidates);
     const int count = static_cast<int>(candidates.size());
     {
-        const Grid grid(candidates, rows, cols);
+        const Grid grid(candidates, pixels.rows, pixels.cols);
         parallel_for(count, parameters.threads, [&](int begin, int end, int) {
             for (int i = begin; i < end; ++i) {
                 Candidate& c = kept[static_cast<std::size_t>(i)];
@@ -190,14 +190,14 @@ void pool(std::vector<Candidate>& candidates, int rows, int cols, bool projectiv
     kept.erase(std::remove_if(kept.begin(), kept.end(), [&](const Candidate& c) { return c.significance < least; }), kept.end());
     candidates = kept;
     for (int round = 0; round < align_rounds; ++round) {
-        const Grid grid(kept, rows, cols);
+        const Grid grid(kept, pixels.rows, pixels.cols);
         parallel_for(static_cast<int>(kept.size()), parameters.threads, [&](int begin, int end, int) {
-            for (int i = begin; i < end; ++i) align(grid, kept[static_cast<std::size_t>(i)], rows, cols, parameters.max_shift, candidates[static_cast<std::size_t>(i)]);
+            for (int i = begin; i < end; ++i) align(grid, kept[static_cast<std::size_t>(i)], pixels, parameters.max_shift, candidates[static_cast<std::size_t>(i)]);
         });
         kept = candidates;
     }
     if (!parameters.normals) return;
-    const Grid grid(kept, rows, cols);
+    const Grid grid(kept, pixels.rows, pixels.cols);
     parallel_for(static_cast<int>(kept.size()), parameters.threads, [&](int begin, int end, int) {
         for (int i = begin; i < end; ++i) {
             Candidate& c = candidates[static_cast<std::size_t>(i)];
