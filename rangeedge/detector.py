@@ -435,9 +435,10 @@ def _write_node(fs: cv2.FileStorage, name: str, value: Any) -> None:
 
 
 def _params_in(func: str, node: cv2.FileNode) -> ScanLineParams:
-    options = {name: _node_value(node.getNode(name)) for name in node.keys()}  # noqa: SIM118
-    if options.get("heightMap") in (0, 1):
-        options["heightMap"] = bool(options["heightMap"])
+    options = {name: _node_value(func, node.getNode(name)) for name in node.keys()}  # noqa: SIM118
+    heightMap = options.get("heightMap")
+    if isinstance(heightMap, int) and heightMap in (0, 1):  # a file storage knows no bool
+        options["heightMap"] = bool(heightMap)
     if isinstance(options.get("noise"), dict):
         try:
             options["noise"] = NoiseModel(**options["noise"])
@@ -446,17 +447,20 @@ def _params_in(func: str, node: cv2.FileNode) -> ScanLineParams:
     return params_of(func, options.pop("eps", None), options)
 
 
-def _node_value(node: cv2.FileNode) -> Any:
+def _node_value(func: str, node: cv2.FileNode) -> Any:
     """What `_write_node` has written, in the types of Python."""
     if node.isInt():
         return int(node.real())
     if node.isReal():
         return node.real()
     if node.isSeq():
-        return tuple(_node_value(node.at(i)) for i in range(node.size()))
+        return tuple(_node_value(func, node.at(i)) for i in range(node.size()))
     if not node.isMap():
         return node.string() if node.isString() else None
     keys = node.keys()
     if "dt" in keys:
-        return node.mat()
-    return {key: _node_value(node.getNode(key)) for key in keys}
+        try:
+            return node.mat()
+        except cv2.error as problem:
+            raise error(func, f"`{node.name()}` is a damaged matrix: {problem.err}", problem.code) from problem
+    return {key: _node_value(func, node.getNode(key)) for key in keys}

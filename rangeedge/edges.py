@@ -201,8 +201,8 @@ def splitScanLine(z: np.ndarray, eps: float, pixelSize: float | np.ndarray = 1.0
     Examples
     --------
     >>> import numpy as np
-    >>> splitScanLine(np.array([0, 1, 2, 3, 4, 4, 4, 4, 4.0]), 0.1).tolist()
-    [[0, 4], [5, 8]]
+    >>> splitScanLine(np.array([0, 1, 2, 3, 4, 4, 4, 4.0]), 0.1).tolist()
+    [[0, 3], [4, 7]]
     """
     func = "splitScanLine"
     z = array(func, "z", z, "a real array of shape (N,)", ndim=(1,))
@@ -284,6 +284,7 @@ def edgeStrength(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import EDGE_OCCLUDED, EDGE_OCCLUDING
     >>> z = np.where(np.arange(40) < 20, 1.0, 1.25) * np.ones((30, 1))
     >>> s = edgeStrength(z, noise=0.001)
     >>> float(s.jump[15, 19]), float(s.jump[15, 20]), float(s.jump[15, 21])
@@ -330,8 +331,8 @@ def edgePoints(
     >>> import numpy as np
     >>> roof = np.abs(np.arange(41) - 20.3) * np.ones((5, 1))
     >>> points = edgePoints(roof, noise=0.001, directions=1)
-    >>> len(points), points["x"].round(3).tolist()
-    (5, [20.3, 20.3, 20.3, 20.3, 20.3])
+    >>> len(points), np.unique(points["x"].round(3))
+    (5, array([20.3], dtype=float32))
     """
     params = params_of("edgePoints", eps, options)
     return points_of("edgePoints", frame_of("edgePoints", src, params, mask), params)

@@ -148,14 +148,18 @@ def noise_of(frame: RangeFrame) -> NoiseModel:
 
 
 def _third_differences(ordinate: np.ndarray, lag: int) -> tuple[np.ndarray, np.ndarray]:
-    """|y0 - 3 y1 + 3 y2 - y3| / sqrt(20) along rows and columns, and y1; windows with invalid pixels left out."""
+    """|y0 - 3 y1 + 3 y2 - y3| / sqrt(20) along rows and columns, and the means; windows with invalid pixels left out.
+
+    The mean of a window is independent of its difference, so that bins of it do not select among the differences.
+    """
     found, where = [np.empty(0)], [np.empty(0)]
     for y in (ordinate, ordinate.T):
         if len(y) > 3 * lag:
-            d = np.abs(y[3 * lag :] - y[: -3 * lag] - 3 * (y[2 * lag : -lag] - y[lag : -2 * lag])) / np.sqrt(20)
+            outer, inner = (y[: -3 * lag], y[3 * lag :]), (y[lag : -2 * lag], y[2 * lag : -lag])
+            d = np.abs(outer[1] - outer[0] - 3 * (inner[1] - inner[0])) / np.sqrt(20)
             inside = np.isfinite(d)
             found.append(d[inside])
-            where.append(y[lag : -2 * lag][inside])
+            where.append((outer[0] + inner[0] + inner[1] + outer[1])[inside] / 4)
     return np.concatenate(found), np.concatenate(where)
 
 

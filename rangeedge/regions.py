@@ -1,4 +1,4 @@
-"""Regions: surfaces grown from seeds under the noise model, competing for pixels, merged where one explains both."""
+"""Regions: surfaces grown from seeds under the noise model, one label each."""
 
 from __future__ import annotations
 
@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._args import boolean, fail, image8, integer, labels32s, number
+from ._args import boolean, image8, integer, labels32s, number
+from .closure import surface_map
+from .detector import detectEdges
 from .distance import distanceTransform
-from .edges import detectEdges
 from .geometry import RangeFrame, range_frame
-from .noise import NoiseModel, noise_of
-from .seeds import extractSeeds
+from .noise import kernel_noise, noise_of
+from .seeds import extractSeeds, label_statistics
+from .surfaces import surfaces_of
+
 
 def growRegions(
     src: np.ndarray,
@@ -30,11 +33,102 @@ def growRegions(
     minArea: int = 100,
     newSeeds: bool = False,
 ) -> np.ndarray:
+    """Grow regions from markers: pixels go to the surface they lie on, edges keep surfaces apart.
+
+    growRegions(src, markers, *[, edges[, K[, pixelSize[, heightMap[, depthFactor[, mask[, noise[, tolerance
+    [, smoothAngle[, minArea[, newSeeds]]]]]]]]]]]) -> labels
+
+    1. *Surfaces*: each marker gets a plane by least squares; a quadratic where the plane fails; two planes that meet
+       in a crease where those are better than the quadratic, as behind a gap in an edge.
+    2. *Growing*: all surfaces compete for the free pixels around them, the smallest residual first, up to `tolerance`
+       standard deviations, and not into edges. They are fitted anew while they grow. A quadratic that has turned
+       around a crease is cut in two.
+    3. *Merging*: patches that one surface describes as well as their own join; so do patches that meet along a border
+       mostly without edges under less than `smoothAngle`, or three times that where one of them is curved. What is
+       small beside its neighbour joins one, and never links two.
+    4. *Borders*: edge pixels, and others that are left, go to the neighbouring surface they fit best, up to twice the
+       tolerance. Strips along rounded edges and regions below `minArea` fall to their neighbours.
+
+    Residuals are perpendicular to nothing but the image: of inverse depth for a camera, of height on a grid, where
+    planes are planes. Their standard deviation is that of the noise, scaled to the typical misfit of the markers, since
+    the noise of many sensors is correlated between pixels; on slopes that of the pixel's place comes on top.
+
+    Parameters
+    ----------
+    src, K, pixelSize, heightMap, depthFactor, mask
+        Range image and its geometry, as for `edgeStrength`.
+    markers : (H, W) CV_32S
+        Labels > 0 on the pixels to start from, as from `extractSeeds`; several may lie on one surface.
+    edges : (H, W) CV_8U or bool, optional
+        Edge map, non-zero on edges.
+    noise : NoiseModel, float or (H, W) array, optional
+        Noise of the range image; estimated from it by default.
+    tolerance : float
+        How far a pixel may lie off its surface, in standard deviations, > 0.
+    smoothAngle : float
+        Angle in degrees below which surfaces that meet without an edge go on into each other, from 0 to 30.
+    minArea : int
+        Least area of a region, in pixels.
+    newSeeds : bool
+        Whether areas that no marker reaches grow regions of their own.
+
+    Returns
+    -------
+    labels : (H, W) CV_32S
+        1, 2, ... in raster order of first pixels; every region is 4-connected. 0 without data and where nothing fits.
+
+    Raises
+    ------
+    rangeedge.error
+        If an argument has a wrong type, shape or range.
+
+    Examples
+    --------
+    >>> depth = np.tile(np.abs(np.arange(60.0) - 30), (60, 1))
+    >>> markers = np.zeros((60, 60), np.int32)
+    >>> markers[20:40, 10:20], markers[20:40, 40:50] = 7, 9
+    >>> growRegions(depth, markers, noise=0.1)[0, [0, 29, 31, 59]]
+    array([1, 1, 2, 2], dtype=int32)
+    """
     func = "growRegions"
     frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    markers = labels32s(func, "markers", markers, frame.shape)
-    edges = None if edges is None else image8(func, "edges", edges, frame.shape)
-    return _grown(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, newSeeds)
+    return _grow(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, newSeeds)
+
+
+def growRegionsWithStats(
+    src: np.ndarray,
+    markers: np.ndarray,
+    *,
+    edges: np.ndarray | None = None,
+    K: Any = None,
+    pixelSize: Any = None,
+    heightMap: bool = False,
+    depthFactor: float = 1000.0,
+    mask: np.ndarray | None = None,
+    noise: Any = None,
+    tolerance: float = 3.0,
+    smoothAngle: float = 8.0,
+    minArea: int = 100,
+    newSeeds: bool = False,
+) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Grow regions from markers, and describe each: extent, centre and surface.
+
+    growRegionsWithStats(src, markers, *[, edges[, ...]]) -> retval, labels, stats, centroids, surfaces
+
+    Parameters are those of `growRegions`, results those of `segmentRegionsWithStats`.
+
+    Examples
+    --------
+    >>> markers = np.zeros((40, 50), np.int32)
+    >>> markers[10:30, 10:30] = 1
+    >>> count, labels, stats, centroids, surfaces = growRegionsWithStats(np.ones((40, 50)), markers)
+    >>> count, stats[1], surfaces["normal"][1] + 0.0
+    (2, array([   0,    0,   50,   40, 2000], dtype=int32), array([ 0.,  0., -1.]))
+    """
+    func = "growRegionsWithStats"
+    frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
+    labels = _grow(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, newSeeds)
+    return _described(frame, labels, heightMap)
 
 
 def segmentRegions(
@@ -53,60 +147,177 @@ def segmentRegions(
     smoothAngle: float = 8.0,
     minArea: int = 100,
 ) -> np.ndarray:
+    """Segment a range image into surfaces: one label for each face of a polyhedron, cylinder, sphere.
+
+    segmentRegions(src, *[, K[, pixelSize[, heightMap[, depthFactor[, mask[, noise[, edges[, minDistance[, separation
+    [, tolerance[, smoothAngle[, minArea]]]]]]]]]]]]) -> labels
+
+    `detectEdges`, `distanceTransform` to the edges and to pixels without data, `extractSeeds`, `growRegions` with
+    new seeds where none has reached.
+
+    Parameters
+    ----------
+    src, K, pixelSize, heightMap, depthFactor, mask
+        Range image and its geometry, as for `edgeStrength`.
+    noise : NoiseModel, float or (H, W) array, optional
+        Noise of the range image; estimated from it by default.
+    edges : (H, W) CV_8U or bool, optional
+        Edge map to use instead of that of `detectEdges` with its defaults.
+    minDistance, separation
+        Of the seeds, as for `extractSeeds`.
+    tolerance, smoothAngle, minArea
+        Of the regions, as for `growRegions`.
+
+    Returns
+    -------
+    labels : (H, W) CV_32S
+        1, 2, ... in raster order of first pixels; every region is 4-connected. 0 without data and where nothing fits.
+
+    Raises
+    ------
+    rangeedge.error
+        If an argument has a wrong type, shape or range.
+
+    Examples
+    --------
+    A step and a roof:
+
+    >>> x = np.arange(90)
+    >>> depth = np.tile(np.where(x < 30, 60.0, abs(x - 60)), (60, 1))
+    >>> segmentRegions(depth, noise=0.1)[30, [0, 29, 31, 57, 63, 89]]
+    array([1, 1, 2, 2, 3, 3], dtype=int32)
+    """
     func = "segmentRegions"
     frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    if edges is None:
-        geometry = dict(K=K, pixelSize=pixelSize, heightMap=heightMap, depthFactor=depthFactor, noise=noise)
-        edges = detectEdges(src, mask=mask, **geometry)
-    edges = image8(func, "edges", edges, frame.shape)
+    geometry = dict(K=K, pixelSize=pixelSize, heightMap=heightMap, depthFactor=depthFactor, mask=mask)
+    return _segment(
+        func, src, frame, geometry, noise, edges, (minDistance, separation), tolerance, smoothAngle, minArea
+    )
+
+
+def segmentRegionsWithStats(
+    src: np.ndarray,
+    *,
+    K: Any = None,
+    pixelSize: Any = None,
+    heightMap: bool = False,
+    depthFactor: float = 1000.0,
+    mask: np.ndarray | None = None,
+    noise: Any = None,
+    edges: np.ndarray | None = None,
+    minDistance: float = 3.0,
+    separation: float = 0.65,
+    tolerance: float = 3.0,
+    smoothAngle: float = 8.0,
+    minArea: int = 100,
+) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Segment a range image into surfaces, and describe each: extent, centre and surface.
+
+    segmentRegionsWithStats(src, *[, K[, ...]]) -> retval, labels, stats, centroids, surfaces
+
+    Parameters
+    ----------
+    src, K, ...
+        As for `segmentRegions`.
+
+    Returns
+    -------
+    retval : int
+        Number of labels, that of the background included, as from `cv2.connectedComponentsWithStats`.
+    labels : (H, W) CV_32S
+        As from `segmentRegions`.
+    stats : (retval, 5) CV_32S
+        Columns ``cv2.CC_STAT_LEFT``, ``CC_STAT_TOP``, ``CC_STAT_WIDTH``, ``CC_STAT_HEIGHT``, ``CC_STAT_AREA``; row 0 is
+        the background.
+    centroids : (retval, 2) CV_64F
+        Means (x, y) of the pixels.
+    surfaces : (retval,) structured array
+        Fields, in the coordinates and the unit of the range image (those of the camera with `K`; columns and rows times
+        `pixelSize` on a grid):
+
+        - ``curved``: whether a plane does not describe the region;
+        - ``centroid``, ``normal``: mean of the points, and unit normal there, toward the viewer;
+        - ``quadric``: (a, b, ..., j) of a x^2 + b y^2 + c z^2 + d xy + e xz + f yz + g x + h y + i z + j = 0, scaled so
+          that the value is about the distance from the surface; of a plane, only g, h, i, j are not 0;
+        - ``rms``: root mean square distance of the points from the surface.
+
+        Row 0 is 0.
+
+    Raises
+    ------
+    rangeedge.error
+        As `segmentRegions`.
+
+    Notes
+    -----
+    Quadrics after Taubin, PAMI 13(11), 1991.
+
+    Examples
+    --------
+    >>> x = np.arange(90)
+    >>> depth = np.tile(np.where(x < 30, 60.0, abs(x - 60)), (60, 1))
+    >>> count, labels, stats, centroids, surfaces = segmentRegionsWithStats(depth, noise=0.1)
+    >>> count, surfaces["curved"].tolist(), surfaces["normal"][1].round(3) + 0.0
+    (4, [False, False, False, False], array([ 0.,  0., -1.]))
+    """
+    func = "segmentRegionsWithStats"
+    frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
+    geometry = dict(K=K, pixelSize=pixelSize, heightMap=heightMap, depthFactor=depthFactor, mask=mask)
+    seeds = (minDistance, separation)
+    labels = _segment(func, src, frame, geometry, noise, edges, seeds, tolerance, smoothAngle, minArea)
+    return _described(frame, labels, heightMap)
+
+
+def _segment(
+    func: str,
+    src: np.ndarray,
+    frame: RangeFrame,
+    geometry: dict[str, Any],
+    noise: Any,
+    edges: np.ndarray | None,
+    seeds: tuple[float, float],
+    tolerance: float,
+    smoothAngle: float,
+    minArea: int,
+) -> np.ndarray:
+    if noise is None:
+        noise = noise_of(frame)
+    edges = detectEdges(src, noise=noise, **geometry) if edges is None else image8(func, "edges", edges, frame.shape)
     distance = distanceTransform((edges != 0) | (frame.valid == 0))
+    minDistance = number(func, "minDistance", seeds[0], 0, above=True)
+    separation = number(func, "separation", seeds[1], 0, np.nextafter(1, 0), above=True)
     _, markers = extractSeeds(distance, minDistance=minDistance, separation=separation)
-    return _grown(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, True)
+    return _grow(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, True)
 
 
-def _grown(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, newSeeds) -> np.ndarray:
+def _grow(
+    func: str,
+    frame: RangeFrame,
+    markers: np.ndarray,
+    edges: np.ndarray | None,
+    noise: Any,
+    tolerance: float,
+    smoothAngle: float,
+    minArea: int,
+    newSeeds: bool,
+) -> np.ndarray:
+    markers = labels32s(func, "markers", markers, frame.shape)
+    edges = None if edges is None else image8(func, "edges", edges, frame.shape)
     parameters = _core.RegionParameters(
         tolerance=number(func, "tolerance", tolerance, 0, above=True),
-        smooth_angle=number(func, "smoothAngle", smoothAngle, 0, 45),
+        smooth_angle=number(func, "smoothAngle", smoothAngle, 0, 30),
         min_area=integer(func, "minArea", minArea, 1),
         new_seeds=boolean(func, "newSeeds", newSeeds),
     )
-    noise = noise_of(frame) if noise is None else noise
-    labels = np.zeros(frame.shape, np.int32)
-    if frame.valid.any():
-        _core.grow_regions(**range_map(frame, noise, edges), markers=markers, parameters=parameters, labels=labels)
+    arguments = surface_map(frame, *kernel_noise(func, noise, frame))
+    arguments["edges"] = edges
+    labels = np.empty(frame.shape, np.int32)
+    _core.grow_regions(**arguments, markers=markers, parameters=parameters, labels=labels)
     return labels
 
 
-def range_map(frame: RangeFrame, noise: Any, edges: np.ndarray | None) -> dict[str, Any]:
-    """What the kernels on surfaces take: places on the image plane, ordinates, their noise, and edges."""
-    x, y, to_plane = _places(frame)
-    if not isinstance(noise, NoiseModel):
-        noise = NoiseModel(c=noise) if frame.projective else NoiseModel(a=noise)
-    offset = float(np.nanmean(frame.ordinate[::4, ::4]))
-    return dict(
-        x=x,
-        y=y,
-        ordinate=(frame.ordinate - offset).astype(np.float32),
-        offset=offset,
-        projective=frame.projective,
-        to_plane=to_plane,
-        noise=(noise.a, noise.b, noise.c),
-        noise_map=None,
-        edges=edges,
-    )
-
-
-def _places(frame):
-    if frame.samples.ndim == 2:
-        return None, None, frame.to_plane
-    axis = np.asarray(frame.axis)
-    side = np.cross([0, 1, 0] if abs(axis[1]) < 0.9 else [1, 0, 0], axis)
-    side /= np.linalg.norm(side)
-    points = frame.samples.astype(np.float64)
-    x, y = points @ side, points @ np.cross(axis, side)
-    if frame.projective:
-        along = points @ axis
-        x, y = x / along, y / along
-    spacing = max(np.nanmedian(np.abs(np.diff(x, axis=1))), np.nanmedian(np.abs(np.diff(y, axis=0))), 1e-12)
-    return (x / spacing).astype(np.float32), (y / spacing).astype(np.float32), (spacing, 0.0, 0.0, 0.0, spacing, 0.0)
+def _described(
+    frame: RangeFrame, labels: np.ndarray, heightMap: bool
+) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    count = int(labels.max()) + 1
+    return count, labels, *label_statistics(labels, count), surfaces_of(frame, labels, count, heightMap)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -282,10 +283,7 @@ class Image:
     def _grid(self, pixels):
         u, v = np.array(pixels).T
         values = self.data[v, u]
-        if self.projective:
-            y = 1 / values
-        else:
-            y = values if self.height else -values
+        y = 1 / values if self.projective else values if self.height else -values
         x = np.arange(len(pixels)).astype(values.dtype)
         to_plane = np.diag([*self.spacing, 1.0]) if self.K is None else np.linalg.inv(self.K)
         start = to_plane @ [*pixels[0], 1.0]
@@ -319,11 +317,9 @@ class Image:
         cosine = np.linalg.norm(away)  # between the axis and the plane
         away /= cosine
         along = np.cross(normal, away)
-        if self.projective:
-            ahead = (b @ along) / (b @ away) - (a @ along) / (a @ away)
-        else:
-            ahead = (b - a) @ along
-        along = -along if ahead < 0 else along
+        a_depth, b_depth = (a @ away, b @ away) if self.projective else (1, 1)
+        if (b @ along) / b_depth < (a @ along) / a_depth:
+            along = -along
         if self.projective:
             z = (points @ away) * cosine
             with np.errstate(divide="ignore", invalid="ignore"):
@@ -373,7 +369,7 @@ class Detector:
             for refinement in REFINEMENTS:
                 segments = getattr(self, "_" + refinement)(line, segments)
         found = []
-        for left, right in zip(segments, segments[1:]):
+        for left, right in pairwise(segments):
             if right.first - left.last - 1 <= self.p.maxGap:
                 candidate = self._measured(line, left, right, *self._position(line, left, right))
                 if candidate.jump > 0 or candidate.crease > 0:
@@ -389,7 +385,7 @@ class Detector:
         limit = self.p.mergeSignificance**2
         while limit > 0 and len(segments) > 1:
             costs, unions = [], []
-            for left, right in zip(segments, segments[1:]):
+            for left, right in pairwise(segments):
                 union = Segment(left.first, right.last)
                 sigma = line.sigma[left.last]
                 k = np.arange(union.first, union.last + 1)

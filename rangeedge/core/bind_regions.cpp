@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 
+#include "closure.hpp"
 #include "regions.hpp"
 #include "seeds.hpp"
 
@@ -40,6 +41,16 @@ int grow_regions(const Optional& x, const Optional& y, const Map<const float>& o
     return rangeedge::grow_regions(map, markers.data(), parameters, labels.data());
 }
 
+void verify_surfaces(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
+                     bool projective, const std::array<double, 6>& to_plane, const std::array<double, 3>& noise,
+                     const Optional& noise_map, const Map<const std::uint8_t>& edges,
+                     const Map<const std::int32_t>& labels, double correlation, double tolerance, double share,
+                     const nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>& accepted) {
+    const auto map = range_map(x, y, ordinate, offset, projective, to_plane, noise, noise_map, edges);
+    rangeedge::verify_surfaces(map, labels.data(), static_cast<int>(accepted.shape(0)) - 1, correlation, tolerance,
+                               share, accepted.data());
+}
+
 }  // namespace
 
 // Outputs are written in place; masks may be None. Shapes are the caller's to check.
@@ -58,4 +69,8 @@ void bind_regions(nb::module_& m) {
           "offset"_a, "projective"_a, "to_plane"_a, "noise"_a, "noise_map"_a.noconvert().none(),
           "edges"_a.noconvert().none(), "markers"_a.noconvert(), "parameters"_a, "labels"_a.noconvert(),
           nb::call_guard<nb::gil_scoped_release>());
+    m.def("verify_surfaces", &verify_surfaces, "x"_a.noconvert().none(), "y"_a.noconvert().none(),
+          "ordinate"_a.noconvert(), "offset"_a, "projective"_a, "to_plane"_a, "noise"_a,
+          "noise_map"_a.noconvert().none(), "edges"_a.noconvert().none(), "labels"_a.noconvert(), "correlation"_a,
+          "tolerance"_a, "share"_a, "accepted"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
 }

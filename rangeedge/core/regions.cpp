@@ -11,7 +11,6 @@
 namespace rangeedge {
 namespace {
 
-constexpr double lateral = 0.35;      // pixels: by how much a sample may stem from beside its line of sight
 constexpr double loose = 2.0;         // pixels at borders may lie farther off, by this factor
 constexpr int levels = 32;            // of squared residuals in the queue, per tolerance
 constexpr int max_cuts = 4;           // of one marker into planes
@@ -58,7 +57,7 @@ private:
 class Grower {
 public:
     Grower(const RangeMap& map, const RegionParameters& parameters)
-        : image_(map, lateral), parameters_(parameters), patch_(static_cast<std::size_t>(image_.size()), 0) {
+        : image_(map, lateral_deviation), parameters_(parameters), patch_(static_cast<std::size_t>(image_.size()), 0) {
         create(SurfaceSums(), Surface());
     }
 
@@ -111,7 +110,7 @@ private:
     int create(const SurfaceSums& sums, const Surface& surface);
     void add_patches(const Pixels& pixels, int cuts);
     void cut_roofs();
-    void push_neighbours(ResidualQueue& queue, int p, double limit, bool edges_too);
+    void offer(ResidualQueue& queue, int p, int i, double limit) const;
     void flood(double tolerance, bool edges_too);
     void refit();
     void reassign();
@@ -186,37 +185,38 @@ void Grower::sow_rest() {
     });
 }
 
-void Grower::push_neighbours(ResidualQueue& queue, int p, double limit, bool edges_too) {
-    const int i = patch(p);
-    for (const int step : image_.neighbours()) {
-        const int q = p + step;
-        if (patch(q) || !(edges_too ? image_.valid(q) : image_.open(q))) continue;
-        const double r = image_.residual(q, of(i).surface);
-        if (r < limit) queue.push(static_cast<std::size_t>(r / limit * levels), {q, i});
-    }
+void Grower::offer(ResidualQueue& queue, int p, int i, double limit) const {
+    const double r = image_.residual(p, patches_[static_cast<std::size_t>(i)].surface);
+    if (r < limit) queue.push(static_cast<std::size_t>(r / limit * levels), {p, i});
 }
 
 // All patches grow at once, the best fitting pixel first; surfaces follow their pixels, but not into edges.
 void Grower::flood(double tolerance, bool edges_too) {
     const double limit = tolerance * tolerance;
+    const auto neighbours = image_.neighbours();
+    const auto is_free = [&](int p) { return !patch(p) && (edges_too ? image_.valid(p) : image_.open(p)); };
     ResidualQueue queue;
     for_pixels([&](int p) {
-        if (patch(p)) push_neighbours(queue, p, limit, edges_too);
+        if (!is_free(p)) return;
+        for (const int step : neighbours)
+            if (patch(p + step)) offer(queue, p, patch(p + step), limit);
     });
     ResidualQueue::Entry entry{};
     while (queue.pop(entry)) {
-        if (patch(entry.pixel)) continue;
-        Patch& grown = of(entry.patch);
-        if (image_.residual(entry.pixel, grown.surface) >= limit) continue;
-        patch(entry.pixel) = entry.patch;
+        const auto [p, i] = entry;
+        if (patch(p)) continue;
+        Patch& grown = of(i);
         if (!edges_too) {
-            grown.sums.add(image_.sample(entry.pixel));
+            if (image_.residual(p, grown.surface) >= limit) continue;
+            grown.sums.add(image_.sample(p));
             if (grown.count() >= grown.refit_at) {
                 grown.surface = image_.surface_of(grown.sums);
                 grown.refit_at = later(grown.count());
             }
         }
-        push_neighbours(queue, entry.pixel, limit, edges_too);
+        patch(p) = i;
+        for (const int step : neighbours)
+            if (is_free(p + step)) offer(queue, p + step, i, limit);
     }
 }
 
@@ -399,20 +399,19 @@ void Grower::for_components(F&& visit) {
         while (of(k).same != k) k = of(k).same;
         regions[i] = region(k);
     }
-    const auto region_at = [&](int p) { return regions[static_cast<std::size_t>(patch(p))]; };
-    std::vector<char> seen(patch_.size(), 0);
+    std::vector<int> rest(patch_.size());
+    for_pixels([&](int p) { rest[static_cast<std::size_t>(p)] = regions[static_cast<std::size_t>(patch(p))]; });
     Pixels component;
     for_pixels([&](int start) {
-        if (seen[static_cast<std::size_t>(start)] || !patch(start)) return;
-        const int own = region_at(start);
+        const int own = std::exchange(rest[static_cast<std::size_t>(start)], 0);
+        if (!own) return;
         component.assign(1, start);
-        seen[static_cast<std::size_t>(start)] = 1;
         for (std::size_t k = 0; k < component.size(); ++k)
             for (const int step : image_.neighbours()) {
-                const int q = component[k] + step;
-                if (seen[static_cast<std::size_t>(q)] || region_at(q) != own) continue;
-                seen[static_cast<std::size_t>(q)] = 1;
-                component.push_back(q);
+                int& other = rest[static_cast<std::size_t>(component[k] + step)];
+                if (other != own) continue;
+                other = 0;
+                component.push_back(component[k] + step);
             }
         visit(component);
     });

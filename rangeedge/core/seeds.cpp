@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "seeds.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 namespace rangeedge {
@@ -34,54 +34,45 @@ void sort_falling(const float* value, std::vector<Index>& order) {
     }
 }
 
-// The eight neighbours of a pixel that lie in the image.
-template <class F>
-void for_neighbours(Index p, int height, int width, F&& visit) {
-    const int row = p / width, col = p % width;
-    for (int r = std::max(row - 1, 0); r <= std::min(row + 1, height - 1); ++r)
-        for (int c = std::max(col - 1, 0); c <= std::min(col + 1, width - 1); ++c)
-            if (r != row || c != col) visit(r * width + c);
-}
-
 // Sinking water: components of what lies above the level, each known by its highest pixel.
 class Islands {
 public:
-    Islands(const float* distance, int height, int width, float separation)
-        : distance_(distance), height_(height), width_(width), separation_(separation),
-          parent_(static_cast<std::size_t>(height) * static_cast<std::size_t>(width), -1) {}
+    // Pixels have an index in an image with a margin; `neighbours` are the steps to the eight around.
+    Islands(const std::vector<float>& distance, const std::array<Index, 8>& neighbours, float separation)
+        : distance_(distance), neighbours_(neighbours), separation_(separation), parent_(distance.size(), -1) {}
 
     // Peaks by themselves of the pixels in `order`, which fall in distance.
     std::vector<Index> peaks(const std::vector<Index>& order) {
         std::vector<Index> found;
         for (const Index p : order) {
-            at(p) = p;
-            for_neighbours(p, height_, width_, [&](Index q) {
-                if (at(q) >= 0) join(p, q, distance_[p], found);
-            });
+            parent(p) = p;
+            for (const Index step : neighbours_)
+                if (parent(p + step) >= 0) join(p, p + step, found);
         }
         for (const Index p : order)
-            if (at(p) == p) found.push_back(p);
+            if (parent(p) == p) found.push_back(p);
         return found;
     }
 
 private:
-    Index& at(Index p) { return parent_[static_cast<std::size_t>(p)]; }
+    float at(Index p) const { return distance_[static_cast<std::size_t>(p)]; }
+    Index& parent(Index p) { return parent_[static_cast<std::size_t>(p)]; }
 
     Index root(Index p) {
-        while (at(p) != p) p = at(p) = at(at(p));
+        while (parent(p) != p) p = parent(p) = parent(parent(p));
         return p;
     }
 
-    void join(Index p, Index q, float level, std::vector<Index>& found) {
-        Index low = root(p), high = root(q);
+    void join(Index level, Index q, std::vector<Index>& found) {
+        Index low = root(level), high = root(q);
         if (low == high) return;
-        if (distance_[low] > distance_[high] || (distance_[low] == distance_[high] && low < high)) std::swap(low, high);
-        if (level < separation_ * distance_[low]) found.push_back(low);
-        at(low) = high;
+        if (at(low) > at(high) || (at(low) == at(high) && low < high)) std::swap(low, high);
+        if (at(level) < separation_ * at(low)) found.push_back(low);
+        parent(low) = high;
     }
 
-    const float* distance_;
-    int height_, width_;
+    const std::vector<float>& distance_;
+    std::array<Index, 8> neighbours_;
     float separation_;
     std::vector<Index> parent_;
 };
@@ -90,40 +81,48 @@ private:
 
 int extract_seeds(const float* distance, const std::uint8_t* mask, int height, int width, float min_distance,
                   float separation, std::int32_t* markers) {
-    const Index size = static_cast<Index>(height * width);
+    const Index stride = width + 2;
+    const std::array<Index, 8> neighbours{-stride - 1, -stride, -stride + 1, -1, 1, stride - 1, stride, stride + 1};
     const float lowest = separation * min_distance;
+    std::vector<float> inside(static_cast<std::size_t>(stride) * static_cast<std::size_t>(height + 2), 0);
     std::vector<Index> order;
-    for (Index p = 0; p < size; ++p) {
-        markers[p] = 0;
-        if (distance[p] > 0 && distance[p] >= lowest && (!mask || mask[p])) order.push_back(p);
-    }
-    sort_falling(distance, order);
-    const std::vector<Index> peaks = Islands(distance, height, width, separation).peaks(order);
+    for (int row = 0; row < height; ++row)
+        for (int col = 0; col < width; ++col) {
+            const Index k = row * width + col, p = (row + 1) * stride + col + 1;
+            if (!(distance[k] > 0) || distance[k] < lowest || (mask && !mask[k])) continue;
+            inside[static_cast<std::size_t>(p)] = distance[k];
+            order.push_back(p);
+        }
+    sort_falling(inside.data(), order);
 
-    // Mark every seed by its peak, then number them.
-    std::vector<Index> stack;
-    for (const Index peak : peaks) {
-        if (distance[peak] < min_distance) continue;
-        markers[peak] = peak + 1;
+    // Flood every seed from its peak.
+    std::vector<Index> seed(inside.size(), 0), stack;
+    for (const Index peak : Islands(inside, neighbours, separation).peaks(order)) {
+        const float top = inside[static_cast<std::size_t>(peak)];
+        if (top < min_distance) continue;
+        seed[static_cast<std::size_t>(peak)] = peak;
         stack.assign(1, peak);
         while (!stack.empty()) {
             const Index p = stack.back();
             stack.pop_back();
-            for_neighbours(p, height, width, [&](Index q) {
-                if (markers[q] || distance[q] <= 0 || distance[q] < separation * distance[peak] || (mask && !mask[q])) return;
-                markers[q] = peak + 1;
-                stack.push_back(q);
-            });
+            for (const Index step : neighbours) {
+                const auto q = static_cast<std::size_t>(p + step);
+                if (seed[q] || !(inside[q] > 0) || inside[q] < separation * top) continue;
+                seed[q] = peak;
+                stack.push_back(p + step);
+            }
         }
     }
-    std::vector<Index> number(static_cast<std::size_t>(size), 0);
+    // Number them.
+    std::vector<Index> number(inside.size(), 0);
     Index count = 0;
-    for (Index p = 0; p < size; ++p) {
-        if (!markers[p]) continue;
-        Index& n = number[static_cast<std::size_t>(markers[p] - 1)];
-        if (!n) n = ++count;
-        markers[p] = n;
-    }
+    for (int row = 0; row < height; ++row)
+        for (int col = 0; col < width; ++col) {
+            const Index peak = seed[static_cast<std::size_t>((row + 1) * stride + col + 1)];
+            Index& n = number[static_cast<std::size_t>(peak)];
+            if (peak && !n) n = ++count;
+            markers[row * width + col] = n;
+        }
     return count;
 }
 

@@ -9,7 +9,7 @@ namespace {
 
 constexpr double flat = 1.25;            // rms in standard deviations up to which a plane is one
 constexpr double curved_gain = 0.8;      // a quadratic must lower the rms to this share
-constexpr double roof_gain = 0.85;       // two planes must lower the rms of the quadratic to this share
+constexpr double roof_gain = 0.94;       // two planes must lower the rms of the quadratic to this share
 constexpr double correlation_max = 4.0;  // noise over a region, in units of that between pixels
 constexpr double resolution = 1e-6;      // of ordinates in single precision
 constexpr int sample_step = 7;           // one pixel in so many tells the typical noise

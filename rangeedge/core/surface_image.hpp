@@ -28,6 +28,7 @@ struct RangeMap {
 
 using Pixels = std::vector<int>;
 
+constexpr double lateral_deviation = 0.35;  // pixels: by how much a sample may stem from beside its line of sight
 constexpr std::size_t least_pixels = 12;  // of a surface
 constexpr std::size_t least_curved = 40;  // of a quadratic
 
@@ -52,6 +53,7 @@ public:
     // Noise correlated over several pixels moves surfaces more than its deviation between neighbours tells: the typical
     // misfit of a quadratic to one of `sets` does. It scales every standard deviation from then on.
     void estimate_correlation(const std::vector<Pixels>& sets);
+    void set_correlation(double correlation) { correlation_ = correlation; }
     double correlation() const { return correlation_; }
 
     Sample sample(int p) const {
