@@ -30,6 +30,7 @@ from ._constants import (
     THIN_LEE,
     THIN_SKELETON,
 )
+from .closure import closeContours
 from .detector import ScanLineDetector, createScanLineDetector, detectEdges
 from .distance import (
     distanceTransform,
@@ -41,11 +42,13 @@ from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
 from .edges import EdgeStrength, ScanLineParams, edgePoints, edgeStrength, splitScanLine
 from .io import RangeImage, imreadRange, imwriteRange
 from .noise import NoiseModel, estimateNoise
+from .regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
 from .seeds import extractSeeds, extractSeedsWithStats
 from .selection import overallStrength, selectEdges, strengthImage
 from .thinning import thinEdges
 
 if TYPE_CHECKING:
+    from . import batch as batch
     from . import evaluation as evaluation
     from . import optimality as optimality
     from . import synthetic as synthetic
@@ -72,12 +75,17 @@ __all__ = [  # noqa: RUF022
     "detectEdges",
     "ScanLineDetector",
     "createScanLineDetector",
+    "closeContours",
     "distanceTransform",
     "distanceTransformWithLabels",
     "salienceDistanceTransform",
     "salienceDistanceTransformWithLabels",
     "extractSeeds",
     "extractSeedsWithStats",
+    "growRegions",
+    "growRegionsWithStats",
+    "segmentRegions",
+    "segmentRegionsWithStats",
     "drawEdges",
     "drawRegions",
     "colorizeDistance",
@@ -106,7 +114,7 @@ __all__ = [  # noqa: RUF022
     "SALIENCE_ADDITIVE",
 ]
 
-_SUBMODULES = ("evaluation", "optimality", "synthetic")  # imported when first asked for
+_SUBMODULES = ("batch", "evaluation", "optimality", "synthetic")  # imported when first asked for
 
 if not TYPE_CHECKING:
 

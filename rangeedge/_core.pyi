@@ -26,6 +26,9 @@ class Parameters:
         threads: int,
     ) -> None: ...
 
+class RegionParameters:
+    def __init__(self, *, tolerance: float, smooth_angle: float, min_area: int, new_seeds: bool) -> None: ...
+
 def split_scan_line(y: NDArray[_Real], x: NDArray[_Real] | None, eps: float) -> NDArray[np.int32]: ...
 def edge_candidates(
     src: NDArray[_Real],
@@ -69,3 +72,33 @@ def extract_seeds(
     separation: float,
     markers: NDArray[np.int32],
 ) -> int: ...
+def grow_regions(
+    x: NDArray[np.float32] | None,
+    y: NDArray[np.float32] | None,
+    ordinate: NDArray[np.float32],
+    offset: float,
+    projective: bool,
+    to_plane: Sequence[float],
+    noise: Sequence[float],
+    noise_map: NDArray[np.float32] | None,
+    edges: NDArray[np.uint8] | None,
+    markers: NDArray[np.int32],
+    parameters: RegionParameters,
+    labels: NDArray[np.int32],
+) -> int: ...
+def verify_surfaces(
+    x: NDArray[np.float32] | None,
+    y: NDArray[np.float32] | None,
+    ordinate: NDArray[np.float32],
+    offset: float,
+    projective: bool,
+    to_plane: Sequence[float],
+    noise: Sequence[float],
+    noise_map: NDArray[np.float32] | None,
+    edges: NDArray[np.uint8] | None,
+    labels: NDArray[np.int32],
+    correlation: float,
+    tolerance: float,
+    share: float,
+    accepted: NDArray[np.uint8],
+) -> None: ...

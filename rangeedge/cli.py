@@ -1,4 +1,4 @@
-"""The command `rangeedge`: detect, batch, demo and bench."""
+"""The command `rangeedge`: detect, segment, batch, demo and bench."""
 
 from __future__ import annotations
 
@@ -35,7 +35,21 @@ from .batch import detect_file, detectBatch, read_image
 from .detector import detectEdges
 from .edges import ScanLineParams
 from .noise import NoiseModel
-from .results import EDGE_FILES, EdgeResults, edge_files, find_edges, write_folder
+from .regions import growRegions, segmentRegions
+from .results import (
+    EDGE_FILES,
+    GEOMETRY,
+    GROWING,
+    REGION_FILES,
+    SEEDING,
+    EdgeResults,
+    edge_files,
+    find_edges,
+    find_regions,
+    region_files,
+    write_folder,
+)
+from .seeds import extractSeeds
 
 _INPUT = """A range image: 16-bit or float PNG, TIFF, PGM, EXR, PFM, NPY, NPZ, organized PCD or PLY,
 or a file of an ABW, Perceptron or Technical Arts scanner. With a pinhole camera give -K; without, the image is
@@ -46,6 +60,9 @@ _EPILOGUES = {
   rangeedge detect depth.png -K 525,525,319.5,239.5 --out edges     # 16-bit millimetres of a depth camera
   rangeedge detect terrain.tiff --pixel-size 0.5 --height-map --out edges
   rangeedge detect cloud.pcd --crease-threshold 20 --out edges""",
+    "segment": """examples:
+  rangeedge segment depth.png -K 525,525,319.5,239.5 --out regions
+  rangeedge segment cloud.pcd --min-area 300 --out regions""",
     "batch": """examples:
   rangeedge batch frames/*.png -K 525,525,319.5,239.5 --out edges --jobs 2
 Run it again after an interruption, and it does what is missing.""",
@@ -63,7 +80,6 @@ _CHOICES = {
     "measure": {"midpoint": MEASURE_MIDPOINT, "endpoint": MEASURE_ENDPOINT},
     "crease": {"max": CREASE_MAX, "normal": CREASE_NORMAL},
 }
-_GEOMETRY = ("K", "pixelSize", "heightMap", "depthFactor")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -96,6 +112,13 @@ def _parser() -> argparse.ArgumentParser:
     _add_out(detect)
     _add_geometry(detect)
     _add_detector(detect)
+
+    segment = _command(commands, "segment", _segment, "divide one range image into surfaces")
+    segment.add_argument("image", metavar="IMAGE", help=_INPUT)
+    _add_out(segment)
+    _add_geometry(segment)
+    _add_growing(segment)
+    _add_detector(segment)
 
     batch = _command(commands, "batch", _batch, "find the edges of many range images")
     batch.add_argument("images", metavar="IMAGE", nargs="+", help=_INPUT)
@@ -135,6 +158,7 @@ def _command(commands: Any, name: str, run: Callable[[argparse.Namespace], int],
 
 _USAGES = {
     "detect": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
+    "segment": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "batch": "IMAGE... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "demo": "[--real] [options] --out DIR",
     "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
@@ -183,8 +207,17 @@ def _add_detector(parser: argparse.ArgumentParser) -> None:
         _add_option(group, name, kind, text.replace("%(was)s", str(defaults[name])))
     group = parser.add_argument_group("how edges are found (the fields of ScanLineParams)")
     for field in fields(ScanLineParams):
-        if field.name not in _GEOMETRY:
+        if field.name not in GEOMETRY:
             _add_field(group, field.name)
+
+
+def _add_growing(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("how regions grow")
+    texts = {**_documented(extractSeeds), **_documented(growRegions)}
+    for name in GROWING:
+        default = inspect.signature(segmentRegions).parameters[name].default
+        text = f"{'Seeds: ' if name in SEEDING else ''}{texts.get(name, '')} (default: {default:g})"
+        _add_option(group, name, type(default), text)
 
 
 def _add_field(group: Any, name: str) -> None:
@@ -221,9 +254,9 @@ def _kebab(name: str) -> str:
     return re.sub(r"([A-Z])", lambda m: "-" + m[1].lower(), name)
 
 
-def _documented(cls: type) -> dict[str, str]:
+def _documented(documented: Any) -> dict[str, str]:
     """What the numpydoc section `Parameters` says of each parameter, options under their names here."""
-    section = (inspect.getdoc(cls) or "").partition("Parameters\n")[2].partition("\n\n")[0]
+    section = (inspect.getdoc(documented) or "").partition("Parameters\n")[2].partition("\n\n")[0]
     found = re.findall(r"^(\w+) : .*\n((?:    .*\n?)+)", section, re.MULTILINE)
     words = {name: " ".join(text.split()).replace("%", "%%") for name, text in found}
     return {
@@ -307,6 +340,17 @@ def _detect(args: argparse.Namespace) -> int:
     return 0
 
 
+def _segment(args: argparse.Namespace) -> int:
+    options = _options(args)
+    image = read_image(args.image, options)
+    found = find_regions(image.src, **image.geometry)
+    write_folder(args.out, region_files(found, args.image, options))
+    _say_found(args.image, found.edges)
+    print(f"{len(found.surfaces) - 1} regions from {found.seeds.max()} seeds")
+    _say_written(args.out, REGION_FILES)
+    return 0
+
+
 def _batch(args: argparse.Namespace) -> int:
     items = []
     for item in detectBatch(args.images, args.out, jobs=args.jobs, force=args.force, **_options(args)):
@@ -331,6 +375,7 @@ def _demo(args: argparse.Namespace) -> int:
     _say_found(scene.title, found)
     print(scene.score(found))
     _say_written(args.out, {**EDGE_FILES, **scene.descriptions})
+    print(f"Now for its surfaces: rangeedge segment {args.out / 'scene.npz'} --out regions")
     return 0
 
 

@@ -284,6 +284,31 @@ def drawOverview(
     return _sheet(panels, title)
 
 
+def region_overview(
+    surface: np.ndarray,
+    seeds: np.ndarray,
+    edges: np.ndarray,
+    kind: np.ndarray,
+    labels: np.ndarray,
+    *,
+    title: str,
+    heightMap: bool = False,
+) -> np.ndarray:
+    """Range image, edges, seeds and regions in one labelled picture, after the manner of `drawOverview`."""
+    depth = range_frame("drawOverview", surface, heightMap=heightMap).depth
+    size = _panel_size(depth.shape)
+    relief = _resized(_relief(depth), size)
+    seeds, regions = (_resized(drawRegions(part, _subdued(_relief(depth)), 0.8), size) for part in (seeds, labels))
+    thin = _thick(_colour_index(edges != 0, kind), size)
+    panels = [
+        (_depth_caption(depth, heightMap), relief),
+        ("Edges", _paint(_subdued(relief), thin)),
+        ("Seeds", seeds),
+        (f"{len(np.unique(labels[labels > 0]))} regions", regions),
+    ]
+    return _sheet(panels, title)
+
+
 def _backdrop(
     func: str, src: np.ndarray, K: np.ndarray | None, heightMap: bool, shape: tuple[int, int] | None = None
 ) -> np.ndarray:
@@ -474,7 +499,10 @@ def _sheet(panels: list[tuple[str, np.ndarray]], title: str | None) -> np.ndarra
     width = max(width, *(_text_width(caption) for caption, _ in panels))
     cells = [_cell(caption, picture, width) for caption, picture in panels]
     height, width = cells[0].shape[:2]
-    columns = min((1, 2, 3, 6), key=lambda n: abs(np.log(n * width / (-(-len(cells) // n) * height) * 9 / 16)))
+    columns = min(
+        (1, 2, 4) if len(cells) == 4 else (1, 2, 3, 6),
+        key=lambda n: abs(np.log(n * width / (-(-len(cells) // n) * height) * 9 / 16)),
+    )
     cells += [np.full_like(cells[0], _BACKGROUND)] * (-len(cells) % columns)
     rows = [np.hstack(cells[i : i + columns]) for i in range(0, len(cells), columns)]
     top = [] if title is None else [_bar(title, rows[0].shape[1])]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import io
 import json
 import os
@@ -17,14 +18,29 @@ import cv2
 import numpy as np
 
 from ._args import described, error
-from ._constants import EDGE_OCCLUDING
+from .detector import selected_of
 from .distance import distanceTransform
-from .draw import drawOverview
+from .draw import drawOverview, region_overview
 from .edges import EdgeStrength, frame_of, params_of, points_of, strength_of
 from .geometry import RangeFrame
 from .noise import noise_of
-from .selection import selectEdges
+from .regions import growRegionsWithStats, segmentRegions
+from .seeds import extractSeeds
 from .thinning import thinEdges
+
+REGION_FILES = {
+    "overview.png": "everything in one picture",
+    "labels.png": "the region of every pixel, 1, 2, ...; 0 is none (16 bits)",
+    "seeds.png": "the seeds that regions grew from, in the same way (16 bits)",
+    "surfaces.csv": "of every region: box, area, centroid, normal, quadric, deviation",
+    "thin.png": "the edges, one pixel wide: 255, elsewhere 0",
+    "report.json": "the image, the options, and what was found, in numbers",
+}
+
+SELECTION = ("jumpThreshold", "creaseThreshold", "hysteresis", "minLength", "dynamic")  # keywords of detectEdges
+GEOMETRY = ("K", "pixelSize", "heightMap", "depthFactor")
+GROWING = ("minDistance", "separation", "tolerance", "smoothAngle", "minArea")  # keywords of segmentRegions
+SEEDING = {name: inspect.signature(segmentRegions).parameters[name].default for name in GROWING[:2]}
 
 EDGE_FILES = {
     "overview.png": "everything in one picture",
@@ -59,54 +75,47 @@ class EdgeResults(NamedTuple):
         return -depth if self.heightMap else depth
 
 
-def find_edges(
-    src: np.ndarray,
-    *,
-    jumpThreshold: float | None = None,
-    creaseThreshold: float = 30.0,
-    eps: float | None = None,
-    mask: np.ndarray | None = None,
-    hysteresis: float = 1.0,
-    minLength: int = 6,
-    dynamic: bool = False,
-    **options: Any,
-) -> EdgeResults:
+def find_edges(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> EdgeResults:
     """What `detectEdges` returns, with all that it computes on the way."""
-    params = params_of("detectEdges", eps, options)
-    frame = frame_of("detectEdges", src, params, mask)
+    func = "detectEdges"
+    selection = {name: options.pop(name) for name in SELECTION if name in options}
+    params = params_of(func, options.pop("eps", None), options)
+    frame = frame_of(func, src, params, mask)
     if params.noise is None:
         params = dataclasses.replace(params, noise=noise_of(frame))
-    strength = strength_of("detectEdges", frame, params)
-    jump = np.where(strength.kind & EDGE_OCCLUDING, strength.jump, np.float32(0))
-    edges = selectEdges(
-        jump,
-        strength.crease,
-        jumpThreshold or 0.0,
-        creaseThreshold,
-        hysteresis=hysteresis,
-        minLength=minLength,
-        dynamic=dynamic,
-    )
+    strength = strength_of(func, frame, params)
+    edges = selected_of(func, strength, **selection)
     thin = thinEdges(edges)
-    points = points_of("detectEdges", frame, params)
+    points = points_of(func, frame, params)
     return EdgeResults(frame, params.noise, params.heightMap, strength, points, edges, thin, distanceTransform(thin))
+
+
+class RegionResults(NamedTuple):
+    """Everything that `segment` writes, as arrays."""
+
+    edges: EdgeResults
+    seeds: np.ndarray
+    labels: np.ndarray
+    stats: np.ndarray
+    surfaces: np.ndarray
+
+
+def find_regions(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> RegionResults:
+    """What `segmentRegionsWithStats` returns, with all that it computes on the way."""
+    growing = {name: options.pop(name) for name in GROWING if name in options}
+    seeding = {name: growing.pop(name, SEEDING[name]) for name in SEEDING}
+    found = find_edges(src, mask=mask, **options)
+    distance = distanceTransform((found.thin != 0) | (found.frame.valid == 0))
+    _, seeds = extractSeeds(distance, **seeding)
+    geometry = {name: options[name] for name in GEOMETRY if name in options}
+    _, labels, stats, _, surfaces = growRegionsWithStats(
+        src, seeds, edges=found.thin, mask=mask, noise=found.noise, newSeeds=True, **geometry, **growing
+    )
+    return RegionResults(found, seeds, labels, stats, surfaces)
 
 
 def edge_files(found: EdgeResults, title: str, options: Mapping[str, Any]) -> dict[str, bytes]:
     """The files of EDGE_FILES."""
-    from . import __version__
-
-    report = {
-        "image": title,
-        "rangeedge": __version__,
-        "options": plain(options),
-        "height": found.frame.shape[0],
-        "width": found.frame.shape[1],
-        "validPixels": int(np.count_nonzero(found.frame.valid)),
-        "edgePixels": int(np.count_nonzero(found.thin)),
-        "edgePoints": len(found.points),
-        "noise": plain(found.noise),
-    }
     overview = drawOverview(
         found.surface, found.strength, found.thin, found.distance, title=title, heightMap=found.heightMap
     )
@@ -120,8 +129,49 @@ def edge_files(found: EdgeResults, title: str, options: Mapping[str, Any]) -> di
         "significance.tiff": encoded(".tiff", found.strength.significance),
         "distance.tiff": encoded(".tiff", found.distance),
         "points.csv": _points_csv(found.points),
-        "report.json": json.dumps(report, indent=2).encode() + b"\n",
+        "report.json": _report(found, title, options, edgePoints=len(found.points)),
     }
+
+
+def region_files(found: RegionResults, title: str, options: Mapping[str, Any]) -> dict[str, bytes]:
+    """The files of REGION_FILES."""
+    edges, count = found.edges, len(found.surfaces) - 1
+    if max(count, found.seeds.max()) > 65535:
+        raise error("segment", f"labels.png has room for 65535 regions, {count} were found; raise `minArea`")
+    overview = region_overview(
+        edges.surface,
+        found.seeds,
+        edges.thin,
+        edges.strength.kind,
+        found.labels,
+        title=title,
+        heightMap=edges.heightMap,
+    )
+    return {
+        "overview.png": encoded(".png", overview),
+        "labels.png": encoded(".png", found.labels.astype(np.uint16)),
+        "seeds.png": encoded(".png", found.seeds.astype(np.uint16)),
+        "surfaces.csv": _surfaces_csv(found.stats, found.surfaces),
+        "thin.png": encoded(".png", edges.thin),
+        "report.json": _report(edges, title, options, regions=count, seeds=int(found.seeds.max())),
+    }
+
+
+def _report(found: EdgeResults, title: str, options: Mapping[str, Any], **more: int) -> bytes:
+    from . import __version__
+
+    report = {
+        "image": title,
+        "rangeedge": __version__,
+        "options": plain(options),
+        "height": found.frame.shape[0],
+        "width": found.frame.shape[1],
+        "validPixels": int(np.count_nonzero(found.frame.valid)),
+        "edgePixels": int(np.count_nonzero(found.thin)),
+        **more,
+        "noise": plain(found.noise),
+    }
+    return json.dumps(report, indent=2).encode() + b"\n"
 
 
 def plain(value: Any) -> Any:
@@ -147,6 +197,19 @@ def _points_csv(points: np.ndarray) -> bytes:
     row = ",".join(formats.get(name, "%.6g") for name in points.dtype.names) + "\n"
     text.writelines(row % point for point in points.tolist())
     return text.getvalue().encode()
+
+
+def _surfaces_csv(stats: np.ndarray, surfaces: np.ndarray) -> bytes:
+    """Row by row what `segmentRegionsWithStats` returns, the background left out."""
+    names = ["label", "left", "top", "width", "height", "area", "curved"]
+    names += [f"{vector}_{axis}" for vector in ("centroid", "normal") for axis in "xyz"]
+    names += [f"quadric_{coefficient}" for coefficient in "abcdefghij"] + ["rms"]
+    lines = [",".join(names)]
+    for label, (box, surface) in enumerate(zip(stats[1:].tolist(), surfaces[1:], strict=True), 1):
+        reals = np.concatenate([surface["centroid"], surface["normal"], surface["quadric"], [surface["rms"]]])
+        whole = [label, *box, int(surface["curved"])]
+        lines.append(",".join([*map(str, whole), *(f"{value:.9g}" for value in reals.tolist())]))
+    return ("\n".join(lines) + "\n").encode()
 
 
 def write_folder(out: str | os.PathLike[str], files: Mapping[str, bytes]) -> None:

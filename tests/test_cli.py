@@ -21,9 +21,11 @@ from rangeedge import (
     edgeStrength,
     imreadRange,
     imwriteRange,
+    segmentRegions,
+    segmentRegionsWithStats,
 )
 from rangeedge.cli import main
-from rangeedge.results import EDGE_FILES, write_folder
+from rangeedge.results import EDGE_FILES, REGION_FILES, write_folder
 
 K = np.array([[100, 0, 39.5], [0, 100, 29.5], [0, 0, 1]])
 CAMERA = ["-K", "100,100,39.5,29.5"]
@@ -172,6 +174,67 @@ class TestDetect:
         assert {path.name for path in out.iterdir()} == {*EDGE_FILES, "notes.txt"}
 
 
+class TestSegment:
+    def test_writes_what_the_functions_return(self, image, tmp_path, capsys):
+        out = tmp_path / "out"
+        code, said, complaint = run(capsys, "segment", image, *CAMERA, "--out", out)
+        assert (code, complaint) == (0, "")
+        assert {path.name for path in out.iterdir()} == set(REGION_FILES)
+        assert all(str(out / name) in said for name in REGION_FILES)
+
+        count, labels, stats, _, surfaces = segmentRegionsWithStats(box(), K=K)
+        assert count > 2
+        written = read(out / "labels.png")
+        assert written.dtype == np.uint16
+        np.testing.assert_array_equal(written, labels)
+        np.testing.assert_array_equal(read(out / "thin.png"), detectEdges(box(), K=K))
+        seeds = read(out / "seeds.png")
+        assert seeds.dtype == np.uint16
+        assert 0 < np.count_nonzero(seeds) < np.count_nonzero(labels)
+
+        table = np.genfromtxt(out / "surfaces.csv", delimiter=",", names=True)
+        np.testing.assert_array_equal(table["label"], np.arange(1, count))
+        np.testing.assert_array_equal(table["area"], stats[1:, cv2.CC_STAT_AREA])
+        np.testing.assert_array_equal(table["curved"], surfaces["curved"][1:])
+        np.testing.assert_allclose(table["normal_z"], surfaces["normal"][1:, 2], rtol=1e-6)
+        np.testing.assert_allclose(table["quadric_j"], surfaces["quadric"][1:, 9], rtol=1e-6)
+        np.testing.assert_allclose(table["rms"], surfaces["rms"][1:], rtol=1e-6)
+        assert json.loads((out / "report.json").read_text())["regions"] == count - 1
+
+    def test_options_are_the_keywords(self, image, tmp_path, capsys):
+        argv = ["--min-distance", "5", "--separation", "0.5", "--tolerance", "4", "--smooth-angle", "3",
+                "--min-area", "30", "--crease-threshold", "60", "--noise", "0.004"]  # fmt: skip
+        assert run(capsys, "segment", image, *CAMERA, *argv, "--out", tmp_path / "out")[0] == 0
+        labels = segmentRegions(
+            box(), K=K, noise=0.004, edges=detectEdges(box(), K=K, noise=0.004, creaseThreshold=60.0),
+            minDistance=5.0, separation=0.5, tolerance=4.0, smoothAngle=3.0, minArea=30,
+        )  # fmt: skip
+        np.testing.assert_array_equal(read(tmp_path / "out" / "labels.png"), labels)
+
+    @pytest.mark.parametrize(
+        ("argv", "message"),
+        [
+            (["--separation", "1.5"], "`separation` must be"),
+            (["--min-area", "0"], "`minArea` must be"),
+            (["--tolerance", "-1"], "`tolerance` must be"),
+            (["--smooth-angle", "90"], "`smoothAngle` must be"),
+            (["--min-distance", "0"], "`minDistance` must be"),
+        ],
+    )
+    def test_bad_options(self, image, tmp_path, capsys, argv, message):
+        code, said, complaint = run(capsys, "segment", image, *CAMERA, *argv, "--out", tmp_path / "out")
+        assert (code, said) == (2, "")
+        assert message in complaint
+        assert not (tmp_path / "out").exists()
+
+    def test_no_data_at_all(self, tmp_path, capsys):
+        imwriteRange(tmp_path / "empty.png", np.zeros((20, 30), np.uint16))
+        code, said, complaint = run(capsys, "segment", tmp_path / "empty.png", *CAMERA, "--out", tmp_path / "out")
+        assert (code, complaint) == (0, "")
+        assert "0 regions" in said
+        assert not read(tmp_path / "out" / "labels.png").any()
+
+
 class TestBadInput:
     """Exit code 2, a message that names the cause, nothing written."""
 
@@ -298,10 +361,10 @@ class TestHelp:
     def test_names_every_command(self, capsys):
         code, said, _ = run(capsys, "--help")
         assert code == 0
-        for command in ("detect", "batch", "demo", "bench"):
+        for command in ("detect", "segment", "batch", "demo", "bench"):
             assert command in said
 
-    @pytest.mark.parametrize("command", ["detect", "batch", "demo", "bench"])
+    @pytest.mark.parametrize("command", ["detect", "segment", "batch", "demo", "bench"])
     def test_every_option_is_explained(self, capsys, command):
         code, said, _ = run(capsys, command, "--help")
         assert code == 0

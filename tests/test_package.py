@@ -1,0 +1,183 @@
+"""The package as a whole: its names and signatures, what importing it costs, its types, and the documented examples."""
+
+import ast
+import doctest
+import importlib
+import importlib.metadata
+import inspect
+import json
+import pkgutil
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import rangeedge
+from rangeedge import _core
+
+PUBLIC = """
+    error RangeImage imreadRange imwriteRange NoiseModel estimateNoise ScanLineParams splitScanLine
+    EdgeStrength edgeStrength edgePoints strengthImage overallStrength selectEdges thinEdges detectEdges
+    ScanLineDetector createScanLineDetector closeContours
+    distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
+    extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats
+    drawEdges drawRegions colorizeDistance drawOverview
+    DIR_ROWS DIR_COLS DIR_DIAG45 DIR_DIAG135 DIR_ALL FIT_LSQ FIT_INTERP MEASURE_MIDPOINT MEASURE_ENDPOINT
+    CREASE_MAX CREASE_NORMAL EDGE_JUMP EDGE_CONVEX EDGE_CONCAVE EDGE_OCCLUDING EDGE_OCCLUDED EDGE_BOUNDARY
+    THIN_SKELETON THIN_LEE THIN_ITERATIVE SALIENCE_MULTIPLICATIVE SALIENCE_ADDITIVE
+""".split()  # noqa: SIM905
+IMPORT_BUDGET = 0.3  # seconds of processor time, NumPy and OpenCV included
+PACKAGE = Path(rangeedge.__file__).parent
+
+
+def isolated(code, *options):
+    """What `code` prints in a new interpreter that sees the package under test."""
+    command = f"import sys; sys.path.insert(0, {str(PACKAGE.parent)!r}); {code}"
+    run = subprocess.run([sys.executable, *options, "-c", command], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    return run.stdout.strip()
+
+
+def modules():
+    """Every module of the package but the one that runs when it is executed."""
+    names = [m.name for m in pkgutil.iter_modules([str(PACKAGE)]) if m.name not in ("_core", "__main__")]
+    return [rangeedge, *(importlib.import_module(f"rangeedge.{name}") for name in names)]
+
+
+def examples():
+    finder = doctest.DocTestFinder(exclude_empty=True)
+    for module in modules():
+        for example in finder.find(module):
+            if example.examples:
+                yield pytest.param(example, id=example.name.removeprefix("rangeedge."))
+
+
+def test_exports_are_the_public_names():
+    assert sorted(rangeedge.__all__) == sorted(PUBLIC)
+    for name in PUBLIC:
+        assert getattr(rangeedge, name) is not None
+
+
+def test_star_import_brings_the_public_names_only():
+    assert json.loads(
+        isolated("before = set(dir()); from rangeedge import *; import json; print(json.dumps(sorted(dir())))")
+    ) == sorted([*PUBLIC, "before", "json", "sys", *module_attributes()])
+
+
+def module_attributes():
+    return json.loads(isolated("import json; print(json.dumps([n for n in dir() if n.startswith('__')]))"))
+
+
+def test_version_is_that_of_the_distribution():
+    assert re.fullmatch(r"\d+\.\d+\.\d+", rangeedge.__version__)
+    try:
+        distribution = importlib.metadata.version("rangeedge")
+    except importlib.metadata.PackageNotFoundError:
+        pytest.skip("rangeedge is not installed but built in place")
+    assert distribution == rangeedge.__version__
+
+
+def test_bits_of_a_family_are_distinct():
+    for family, count in (("DIR_", 4), ("EDGE_", 6)):
+        bits = [getattr(rangeedge, n) for n in PUBLIC if n.startswith(family) and n != "DIR_ALL"]
+        assert sorted(bits) == [1 << k for k in range(count)]
+    assert rangeedge.DIR_ALL == 15
+
+
+def test_error_is_caught_as_opencv_s_and_as_value_error():
+    for kind in (cv2.error, ValueError, rangeedge.error):
+        with pytest.raises(kind, match=r"distanceTransform: `edges` must be"):
+            rangeedge.distanceTransform(None)
+
+
+@pytest.mark.parametrize("name", ["batch", "evaluation", "optimality", "synthetic"])
+def test_submodules_are_there_without_importing_them(name):
+    loaded, listed, found = json.loads(
+        isolated(
+            "import json, rangeedge as r;"
+            f"print(json.dumps(['rangeedge.{name}' in sys.modules, {name!r} in dir(r), r.{name}.__name__]))"
+        )
+    )
+    assert (loaded, listed, found) == (False, True, f"rangeedge.{name}")
+
+
+def test_unknown_names_are_refused():
+    with pytest.raises(AttributeError, match="module 'rangeedge' has no attribute 'evaluate'"):
+        _ = rangeedge.evaluate
+
+
+@pytest.mark.parametrize("name", ["edgeStrength", "edgePoints", "detectEdges"])
+def test_signatures_show_every_parameter_and_its_default(name):
+    shown = inspect.signature(getattr(rangeedge, name)).parameters
+    for field, default in vars(rangeedge.ScanLineParams()).items():
+        assert shown[field].default == default
+        if field != "eps":
+            assert shown[field].kind is inspect.Parameter.KEYWORD_ONLY
+    assert not any(p.kind is inspect.Parameter.VAR_KEYWORD for p in shown.values())
+
+
+@pytest.mark.parametrize("name", [n for n in PUBLIC if inspect.isroutine(getattr(rangeedge, n, None))])
+def test_functions_are_documented_with_their_call_form(name):
+    function = getattr(rangeedge, name)
+    lines = inspect.getdoc(function).splitlines()
+    assert lines[0].endswith(".")
+    assert any(re.match(rf"{name}\(", line) for line in lines[2:3])
+    assert all(p.annotation is not p.empty for p in list(inspect.signature(function).parameters.values())[:1])
+
+
+def test_import_warns_of_nothing():
+    isolated("import rangeedge", "-W", "error")
+    isolated("import runpy; runpy.run_module('rangeedge.optimality', run_name='other')", "-W", "error")
+
+
+def test_import_is_quick_and_leaves_scikit_image_for_later():
+    measure = (
+        "import time, json; start = time.process_time(); import rangeedge; spent = time.process_time() - start;"
+        "print(json.dumps([spent, [m for m in ('skimage', 'scipy', 'matplotlib') if m in sys.modules]]))"
+    )
+    runs = [json.loads(isolated(measure)) for _ in range(4)]
+    assert all(heavy == [] for _, heavy in runs)
+    assert min(spent for spent, _ in runs) < IMPORT_BUDGET
+
+
+def test_the_package_carries_its_types():
+    assert (PACKAGE / "py.typed").exists()
+    assert (PACKAGE / "_core.pyi").exists()
+
+
+def test_stub_names_what_the_compiled_module_has():
+    def arguments(function):
+        return [a.arg for a in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)]
+
+    def built(function):
+        """The parameter names of every overload."""
+        return {
+            tuple(arguments(ast.parse(re.sub(r"ndarray\[[^]]*\]", "ndarray", text) + ": ...").body[0]))
+            for text, *_ in function.__nb_signature__
+        }
+
+    stub = {
+        node.name: node
+        for node in ast.parse((PACKAGE / "_core.pyi").read_text()).body
+        if isinstance(node, (ast.FunctionDef, ast.ClassDef))
+    }
+    assert sorted(stub) == sorted(name for name in dir(_core) if not name.startswith("_"))
+    for name, node in stub.items():
+        compiled = getattr(_core, name)
+        if isinstance(node, ast.ClassDef):
+            node, compiled = node.body[0], compiled.__init__
+        assert built(compiled) == {tuple(arguments(node))}, name
+
+
+@pytest.mark.parametrize("example", list(examples()))
+def test_examples_of_the_documentation(example):
+    names = {name: getattr(rangeedge, name) for name in rangeedge.__all__}
+    example.globs = {"cv2": cv2, "np": np, **names, **example.globs}
+    report = []
+    runner = doctest.DocTestRunner(optionflags=doctest.NORMALIZE_WHITESPACE)
+    runner.run(example, out=report.append)
+    assert runner.failures == 0, "".join(report)

@@ -1,0 +1,98 @@
+"""Every sample runs, on its own scene or on an image, and writes what it says."""
+
+import csv
+import importlib
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from rangeedge import imwriteRange
+from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
+
+SAMPLES = Path(__file__).resolve().parents[1] / "samples"
+PICTURES = {
+    "edges": ["edges.png"],
+    "thinning": ["thinning.png"],
+    "distance_map": ["distance_map.png"],
+    "salience_map": ["salience_map.png"],
+    "seeds": ["seeds.png", "seeds.tiff"],
+    "segmentation": ["segmentation.png"],
+    "pipeline": ["candidates.png"],
+}
+
+
+@pytest.fixture(autouse=True)
+def from_samples(monkeypatch):
+    monkeypatch.syspath_prepend(SAMPLES)
+    yield
+    for name in ("common", *PICTURES):
+        sys.modules.pop(name, None)
+
+
+def run(name, *argv):
+    return importlib.import_module(name).main([str(arg) for arg in argv])
+
+
+@pytest.fixture
+def image(tmp_path):
+    """A box on a table, 200 x 150 pixels, seen by a camera whose matrix is in the file."""
+    camera = pinholeCamera(np.array([[180.0, 0, 99.5], [0, 180.0, 74.5], [0, 0, 1]]), (200, 150))
+    lying = np.array([[0.9, 0.3, -0.3], [-0.3, 0.95, 0.0], [0.3, 0.1, 0.95]])
+    axes = np.linalg.qr(lying)[0]
+    scene = [plane((0, 0, 1.2), (0, -0.5, -1)), box((0, 0, 0.95), (0.25, 0.2, 0.15), axes)]
+    depth = renderScene(scene, camera).depth + np.random.default_rng(0).normal(0, 0.001, (150, 200))
+    path = tmp_path / "box.npz"
+    imwriteRange(path, np.rint(1000 * depth).astype(np.uint16), **camera.geometry)
+    return path
+
+
+def test_every_sample_is_tested():
+    assert {path.stem for path in SAMPLES.glob("*.py")} == {"common", *PICTURES}
+
+
+@pytest.mark.parametrize("name", PICTURES)
+def test_runs_on_an_image(name, image, tmp_path, capsys):
+    out = tmp_path / "pictures"
+    run(name, image, "--out", out)
+    said = capsys.readouterr().out
+    for picture in PICTURES[name]:
+        content = cv2.imread(str(out / picture), cv2.IMREAD_UNCHANGED)
+        assert content.shape[0] >= 150
+        assert content.shape[1] >= 200
+        assert content.max() > 0
+        assert str(out / picture) in said
+
+
+@pytest.mark.parametrize("name", ["edges", "seeds"])
+def test_runs_on_a_grid_without_edges(name, tmp_path):
+    imwriteRange(tmp_path / "flat.npy", np.zeros((60, 80), np.float32))
+    run(name, tmp_path / "flat.npy", "--pixel-size", "0.5", "--height-map", "--out", tmp_path)
+    assert (tmp_path / PICTURES[name][0]).exists()
+
+
+def test_pipeline_grips_every_object_of_the_scene(tmp_path):
+    run("pipeline", "--out", tmp_path)
+    with open(tmp_path / "candidates.csv", newline="") as file:
+        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+    assert len(rows) > 10
+    for row in rows:
+        place, normal = (np.array([row[prefix + axis] for axis in "xyz"]) for prefix in ("", "normal_"))
+        assert abs(np.linalg.norm(normal) - 1) < 1e-3
+        assert normal @ place < 0
+        assert row["free"] >= 0.015
+        assert row["unevenness"] <= 0.003
+    # Tops of boxes are parallel to the table, which is seen under 32 degrees.
+    tops = [row for row in rows if abs(row["normal_y"] + np.cos(np.radians(32))) < 0.03]
+    assert len(tops) >= 3
+
+
+def test_pipeline_needs_a_camera(tmp_path, capsys):
+    imwriteRange(tmp_path / "flat.npy", np.zeros((60, 80), np.float32))
+    with pytest.raises(SystemExit) as end:
+        run("pipeline", tmp_path / "flat.npy", "--out", tmp_path / "out")
+    assert end.value.code == 2
+    assert "pinhole camera" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
