@@ -31,7 +31,7 @@ from .thinning import thinEdges
 
 CREASE_THRESHOLD = 30.0
 HYSTERESIS = 1.0
-MIN_LENGTH = 7
+MIN_LENGTH = 6
 
 _SUFFIXES = (".xml", ".yml", ".yaml", ".json")  # by which cv2.FileStorage knows the format
 

@@ -88,7 +88,7 @@ class ScanLineParams:
     """
 
     eps: float | None = None
-    epsFactor: float = 4.0
+    epsFactor: float = 3.5
     K: Any = None
     pixelSize: Any = None
     heightMap: bool = False
@@ -101,7 +101,7 @@ class ScanLineParams:
     maxShift: float = 4.0
     maxGap: int = 8
     mergeSignificance: float = 5.5
-    minSignificance: float = 10.0
+    minSignificance: float = 12.0
 
     def __post_init__(self) -> None:
         func = "ScanLineParams"

@@ -14,6 +14,7 @@ from .geometry import RangeFrame, range_frame
 _LAG = 6  # samples: noise of neighbours this far apart counts as independent
 _CORRELATION_MAX = 2.5  # beyond it, curvature rather than noise
 _DEPTH_BINS = 8
+_WINDOWS = 1 << 15  # along rows, and along columns, that an estimate rests on at most
 _BIN_SIZE = 50  # differences that a bin needs
 _TRIM = 0.75  # share of the differences, the small ones, that the estimate rests on
 _TRIMMED_NORMAL = 0.607  # deviation of a normal variable within its central 75 %
@@ -151,10 +152,12 @@ def _third_differences(ordinate: np.ndarray, lag: int) -> tuple[np.ndarray, np.n
     """|y0 - 3 y1 + 3 y2 - y3| / sqrt(20) along rows and columns, and the means; windows with invalid pixels left out.
 
     The mean of a window is independent of its difference, so that bins of it do not select among the differences.
+    Of a large image every so many lines are enough.
     """
     found, where = [np.empty(0)], [np.empty(0)]
     for y in (ordinate, ordinate.T):
         if len(y) > 3 * lag:
+            y = y[:, :: 1 + y.size // _WINDOWS]
             outer, inner = (y[: -3 * lag], y[3 * lag :]), (y[lag : -2 * lag], y[2 * lag : -lag])
             d = np.abs(outer[1] - outer[0] - 3 * (inner[1] - inner[0])) / np.sqrt(20)
             inside = np.isfinite(d)

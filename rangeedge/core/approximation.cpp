@@ -3,12 +3,41 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
+
+#include "simd.hpp"
 
 namespace rangeedge {
 namespace {
 
 constexpr double curved_significance = 5;  // of the quadratic term of a least-squares fit
 constexpr double straddling = 2;           // how much more, in significance, a segment across an edge may cost
+
+// Adds the ordinates of n samples one unit apart, the first at abscissa t: eight at a time, then lane by lane.
+RANGEEDGE_WIDE
+void add_ordinates(const float* y, int n, int t, Moments& m) {
+    Double4 s0[2] = {}, s1[2] = {}, s2[2] = {}, sq[2] = {};
+    Double4 at[2];
+    for (int i = 0; i < 4; ++i) at[0][i] = t + i, at[1][i] = t + i + 4;
+    int k = 0;
+    for (; k + 8 <= n; k += 8)
+        for (int half = 0; half < 2; ++half) {
+            Float4 value;
+            std::memcpy(&value, y + k + 4 * half, sizeof value);
+            const Double4 h = __builtin_convertvector(value, Double4) - m.base, ht = h * at[half];
+            s0[half] += h;
+            s1[half] += ht;
+            s2[half] += ht * at[half];
+            sq[half] += h * h;
+            at[half] += 8.0;
+        }
+    for (int half = 0; half < 2; ++half)
+        for (int i = 0; i < 4; ++i) m.y0 += s0[half][i], m.y1 += s1[half][i], m.y2 += s2[half][i], m.yy += sq[half][i];
+    for (; k < n; ++k) {
+        const double h = static_cast<double>(y[k]) - m.base, x = t + k;
+        m.y0 += h, m.y1 += h * x, m.y2 += h * x * x, m.yy += h * h;
+    }
+}
 
 template <class T>
 class Approximator {
@@ -44,10 +73,8 @@ public:
         r_.curves.clear();
         r_.moments.clear();
         for (const Segment& s : r_.segments) {
-            Moments moments = empty_moments(s.first + (s.last - s.first) / 2);
-            for (int k = s.first; k <= s.last; ++k) add(moments, k);
-            r_.moments.push_back(moments);
-            r_.curves.push_back(fit_least_squares(moments, sigma(s), curved_significance));
+            r_.moments.push_back(moments_of(s));
+            r_.curves.push_back(fit_least_squares(r_.moments.back(), sigma(s), curved_significance));
         }
     }
 
@@ -90,6 +117,20 @@ private:
         return moments;
     }
     void add(Moments& moments, int k) const { moments.add(line_.abscissa(k), line_.ordinate(k)); }
+
+    Moments moments_of(const Segment& s) const {
+        const int middle = s.first + (s.last - s.first) / 2;
+        Moments moments = empty_moments(middle);
+        if constexpr (std::is_same_v<T, float>) {
+            if (!line_.irregular) {
+                moments.count(middle - s.first, s.last - middle);
+                add_ordinates(line_.y.data() + s.first, s.size(), s.first - middle, moments);
+                return moments;
+            }
+        }
+        for (int k = s.first; k <= s.last; ++k) add(moments, k);
+        return moments;
+    }
 
     double sigma(const Segment& s) const { return line_.sigma_at(s.first + s.size() / 2); }
 

@@ -10,15 +10,7 @@
 #include <vector>
 
 #include "parallel.hpp"
-
-// Marks the innermost loops, which are compiled a second time for processors with AVX2 and chosen at load time. Without
-// contraction both forms round alike. Sanitizers cannot run that early.
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define RANGEEDGE_WIDE __attribute__((target_clones("avx2", "default")))
-#else
-#define RANGEEDGE_WIDE
-#endif
+#include "simd.hpp"
 
 namespace rangeedge {
 namespace {

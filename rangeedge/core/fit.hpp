@@ -17,6 +17,17 @@ struct Moments {
         x1 += t, x2 += t2, x3 += t * t2, x4 += t2 * t2;
         y0 += h, y1 += h * t, y2 += h * t2, yy += h * h;
     }
+    // Sets the sums of x for samples one unit apart, from -left to right.
+    void count(int left, int right) {
+        const auto sum1 = [](double k) { return k * (k + 1) / 2; };
+        const auto sum2 = [](double k) { return k * (k + 1) * (2 * k + 1) / 6; };
+        const auto sum4 = [&](double k) { return sum2(k) * (3 * k * k + 3 * k - 1) / 5; };
+        n = left + right + 1;
+        x1 = sum1(right) - sum1(left);
+        x2 = sum2(right) + sum2(left);
+        x3 = sum1(right) * sum1(right) - sum1(left) * sum1(left);
+        x4 = sum4(right) + sum4(left);
+    }
     // The same sums, counted from another origin.
     Moments moved(double to) const {
         const double d = origin - to, d2 = d * d;

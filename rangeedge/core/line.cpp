@@ -11,6 +11,9 @@ enum Direction { rows_bit = 1, cols_bit = 2, diag45_bit = 4 };
 template <class T>
 constexpr T nan = std::numeric_limits<T>::quiet_NaN();
 
+template <class T>
+constexpr T least = static_cast<T>(1e-30);  // no tolerance is finer
+
 struct Vector {
     double x, y, z;
 };
@@ -82,17 +85,32 @@ void LineReader<T>::set_tolerance(Line<T>& line) const {
     const Noise& n = noise_.noise;
     const bool given = parameters_.eps > 0;
     // One tolerance for the whole line: a length on a grid, or a noise that does not change with the ordinate.
-    line.scaled = given ? image_.projective : n.map || n.b > 0 || (image_.projective ? n.a > 0 : n.c > 0);
-    const auto tolerance = [&](double ordinate, std::int64_t pixel) {
-        if (!given) return parameters_.eps_factor * noise_.sigma(ordinate, pixel);
-        return std::max(parameters_.eps * (image_.projective ? ordinate * ordinate : 1), 1e-30);
-    };
-    line.tolerance = line.scaled ? 1 : tolerance(1, 0);
-    if (!line.scaled) return;
+    line.scaled = given ? image_.projective : n.map || n.b != 0 || (image_.projective ? n.a != 0 : n.c != 0);
+    const double factor = given ? parameters_.eps : parameters_.eps_factor * n.correlation;
+    if (!line.scaled) {
+        line.tolerance = given ? factor : parameters_.eps_factor * noise_.sigma(1, 0);
+        return;
+    }
+    line.tolerance = 1;
     line.scale.resize(line.y.size());
-    for (int k = 0; k < line.path.size; ++k)
-        line.scale[static_cast<std::size_t>(k)] =
-            static_cast<T>(1 / tolerance(line.ordinate(k), line.path.pixel(k, image_.cols)));
+    const auto inverse = [](T tolerance) { return 1 / (tolerance > least<T> ? tolerance : least<T>); };
+    const auto f = static_cast<T>(factor);
+    if (n.map && !given) {
+        for (int k = 0; k < line.path.size; ++k) {
+            const auto i = static_cast<std::size_t>(k);
+            const T length = f * static_cast<T>(n.map[line.path.pixel(k, image_.cols)]);
+            line.scale[i] = inverse(image_.projective ? length * line.y[i] * line.y[i] : length);
+        }
+        return;
+    }
+    // As a polynomial of the ordinate: sigma(1 / q) q^2 = a q^2 + b q + c.
+    const T a = given ? f : f * static_cast<T>(n.a), b = given ? 0 : f * static_cast<T>(n.b);
+    const T c = given ? 0 : f * static_cast<T>(n.c);
+    if (image_.projective)
+        for (std::size_t k = 0; k < line.y.size(); ++k) line.scale[k] = inverse((a * line.y[k] + b) * line.y[k] + c);
+    else
+        for (std::size_t k = 0; k < line.y.size(); ++k)
+            line.scale[k] = inverse(a + (b + c * std::abs(line.y[k])) * std::abs(line.y[k]));
 }
 
 // The plane of a line of points holds its first and last point and the viewpoint (projective) or the viewing axis.

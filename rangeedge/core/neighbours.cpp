@@ -11,8 +11,7 @@ namespace rangeedge {
 namespace {
 
 constexpr double degrees = 57.295779513082320877;
-constexpr int reach = 3;               // pixels, in either axis
-constexpr float spread = 1.5f;         // pixels: standard deviation of the weight of a neighbour
+constexpr float reach = 4;             // pixels; weights fall from 1 at the candidate itself to 0 there
 constexpr float capped = 8;            // a single candidate's share of the evidence
 constexpr float lone = 1 / 3.0f;       // what a candidate without neighbours is worth
 constexpr int align_rounds = 2;
@@ -22,42 +21,43 @@ struct Vector {
     double x, y, z;
 };
 
-// Candidates by pixel: those of pixel p are items[start[p]] .. items[start[p + 1] - 1].
+// Candidates by square cells of the image, for those near a given one.
 class Grid {
 public:
     Grid(const std::vector<Candidate>& candidates, int rows, int cols)
-        : candidates_(candidates), rows_(rows), cols_(cols), start_(static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols) + 1, 0),
-          items_(candidates.size()) {
-        for (const Candidate& c : candidates) ++start_[cell(c) + 1];
+        : candidates_(candidates), rows_(rows / cell_size + 1), cols_(cols / cell_size + 1),
+          start_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(cols_) + 1, 0), items_(candidates.size()) {
+        for (const Candidate& c : candidates) ++start_[cell(column(c), row(c)) + 1];
         for (std::size_t p = 1; p < start_.size(); ++p) start_[p] += start_[p - 1];
         std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
-        for (std::size_t i = 0; i < candidates.size(); ++i)
-            items_[static_cast<std::size_t>(next[cell(candidates[i])]++)] = static_cast<std::int32_t>(i);
+        for (std::size_t i = 0; i < candidates.size(); ++i) {
+            const Candidate& c = candidates[i];
+            items_[static_cast<std::size_t>(next[cell(column(c), row(c))]++)] = static_cast<std::int32_t>(i);
+        }
     }
 
-    // Calls visit(candidate, weight) for c itself and every candidate near it that shares a kind with it.
+    // Calls visit(candidate, weight) for c itself and every candidate within reach that shares a kind with it.
     template <class Visit>
     void for_each_near(const Candidate& c, Visit&& visit) const {
         const int u = column(c), v = row(c);
-        const int left = std::max(0, u - reach), right = std::min(cols_ - 1, u + reach);
-        for (int y = std::max(0, v - reach); y <= std::min(rows_ - 1, v + reach); ++y) {
-            const std::size_t line = static_cast<std::size_t>(y) * static_cast<std::size_t>(cols_);
-            const auto first = start_[line + static_cast<std::size_t>(left)];
-            const auto last = start_[line + static_cast<std::size_t>(right) + 1];
+        const int left = std::max(0, u - 1), right = std::min(cols_ - 1, u + 1);
+        for (int y = std::max(0, v - 1); y <= std::min(rows_ - 1, v + 1); ++y) {
+            const auto first = start_[cell(left, y)], last = start_[cell(right, y) + 1];
             for (auto k = first; k < last; ++k) {
                 const Candidate& n = candidates_[static_cast<std::size_t>(items_[static_cast<std::size_t>(k)])];
-                if (!(n.kind & c.kind & kinds)) continue;
                 const float du = n.x - c.x, dv = n.y - c.y;
-                visit(n, std::exp(-(du * du + dv * dv) / (2 * spread * spread)));
+                const float rest = 1 - (du * du + dv * dv) / (reach * reach);
+                if (rest > 0 && (n.kind & c.kind & kinds)) visit(n, rest * rest);
             }
         }
     }
 
 private:
-    int column(const Candidate& c) const { return std::min(std::max(static_cast<int>(std::lround(c.x)), 0), cols_ - 1); }
-    int row(const Candidate& c) const { return std::min(std::max(static_cast<int>(std::lround(c.y)), 0), rows_ - 1); }
-    std::size_t cell(const Candidate& c) const {
-        return static_cast<std::size_t>(row(c)) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(column(c));
+    static constexpr int cell_size = 4;  // pixels, no less than the reach
+    int column(const Candidate& c) const { return std::min(std::max(static_cast<int>(c.x) / cell_size, 0), cols_ - 1); }
+    int row(const Candidate& c) const { return std::min(std::max(static_cast<int>(c.y) / cell_size, 0), rows_ - 1); }
+    std::size_t cell(int column, int row) const {
+        return static_cast<std::size_t>(row) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(column);
     }
 
     const std::vector<Candidate>& candidates_;

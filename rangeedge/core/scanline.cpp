@@ -2,6 +2,9 @@
 #include "scanline.hpp"
 
 #include <cmath>
+#include <type_traits>
+
+#include "simd.hpp"
 
 namespace rangeedge {
 namespace {
@@ -29,25 +32,65 @@ struct ThreePoint {
 };
 
 // Where the residual is largest, and how large; the first of equals.
+template <class T>
 struct Worst {
+    T residual;
     int at;
-    double residual;
 };
 
+// Over samples first .. last - 1.
 template <class T>
-Worst worst_sample(const Run<T>& run, const Segment& s) {
-    const ThreePoint<T> curve(run, s);
-    T largest = -1;
-    int at = s.first;
-    for (int k = s.first + 1; k < s.last; ++k) {
+Worst<T> worst_of(const Run<T>& run, const ThreePoint<T>& curve, int first, int last) {
+    Worst<T> worst{-1, first};
+    for (int k = first; k < last; ++k) {
         T r = curve.residual(run.x ? run.x[k] : static_cast<T>(k), run.y[k]);
         if (run.scale) r *= run.scale[k];
-        if (r > largest) {
-            largest = r;
-            at = k;
+        if (r > worst.residual) worst = {r, k};
+    }
+    return worst;
+}
+
+// The same for samples one unit apart, eight at a time: each lane keeps its own worst.
+RANGEEDGE_WIDE
+Worst<float> worst_of_lanes(const float* y, const float* scale, const ThreePoint<float>& curve, int first, int blocks) {
+    const Int8 count{0, 1, 2, 3, 4, 5, 6, 7};
+    Int8 index = count + first, at = index;
+    Float8 t = __builtin_convertvector(index, Float8) - curve.origin;
+    Float8 worst = {-1, -1, -1, -1, -1, -1, -1, -1};
+    for (int k = first; k < first + 8 * blocks; k += 8) {
+        Float8 value, factor;
+        std::memcpy(&value, y + k, sizeof value);
+        Float8 r = value - (curve.ym + t * (curve.b + curve.a * t));
+        r = r < 0 ? -r : r;
+        if (scale) {
+            std::memcpy(&factor, scale + k, sizeof factor);
+            r *= factor;
+        }
+        const Int8 larger = r > worst;
+        worst = larger ? r : worst;
+        at = larger ? index : at;
+        t += 8;
+        index += 8;
+    }
+    Worst<float> result{worst[0], at[0]};
+    for (int i = 1; i < 8; ++i)
+        if (worst[i] > result.residual || (worst[i] == result.residual && at[i] < result.at)) result = {worst[i], at[i]};
+    return result;
+}
+
+template <class T>
+Worst<T> worst_sample(const Run<T>& run, const Segment& s) {
+    const ThreePoint<T> curve(run, s);
+    const int first = s.first + 1;
+    if constexpr (std::is_same_v<T, float>) {
+        const int blocks = (s.last - first) / 8;
+        if (!run.x && blocks > 0) {
+            const Worst<T> most = worst_of_lanes(run.y, run.scale, curve, first, blocks);
+            const Worst<T> rest = worst_of(run, curve, first + 8 * blocks, s.last);
+            return rest.residual > most.residual ? rest : most;
         }
     }
-    return {at, static_cast<double>(largest)};
+    return worst_of(run, curve, first, s.last);
 }
 
 }  // namespace
@@ -58,8 +101,8 @@ void split_run(const Run<T>& run, T eps, std::vector<Segment>& pending, std::vec
     while (!pending.empty()) {
         const Segment s = pending.back();
         pending.pop_back();
-        const Worst worst = s.size() > 3 ? worst_sample(run, s) : Worst{s.first, 0.0};
-        if (!(worst.residual > static_cast<double>(eps))) {
+        const Worst<T> worst = s.size() > 3 ? worst_sample(run, s) : Worst<T>{0, s.first};
+        if (!(worst.residual > eps)) {
             segments.push_back(s);
             continue;
         }
