@@ -310,6 +310,7 @@ class TestRenderedScenes:
         assert s.correct >= 0.7 * s.truth
 
 
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # the loader leaves a file open
 def test_real_faces(load, score):
     counts = []
     for name in load.mosd_faces_names(complete=True)[:4]:
