@@ -32,13 +32,13 @@ from rangeedge import (
 )
 
 # What the kernels fix and no parameter sets.
-REFINEMENTS = ("merged", "margins_left_out", "fillets_dissolved")  # of least-squares approximations, in this order
+REFINEMENTS = ("merged", "dissolved")  # of least-squares approximations, in this order
 CURVED_SIGNIFICANCE = 5.0  # of the quadratic term
-MARGIN_KEEPS = 8
-FILLET_TOLERANCE = 1.5
+STRADDLING = 2.0  # how much more, in significance, a segment across an edge may cost
 LONE_SIGNIFICANCE = 3.0
 JUMP_TOLERANCES = 2.0
 REACH, SPREAD, CAPPED, LONE_SHARE = 3, 1.5, 8.0, 1 / 3
+ALIGN_ROUNDS, LEAST_SLOPE = 2, 0.3
 LEAST_SPREAD, LEAST_DETERMINANT = 0.05, 0.02
 SMALLEST = 1e-30
 
@@ -215,8 +215,6 @@ class Segment:
     first: int
     last: int
     curve: Curve = None
-    fit_first: int = 0
-    fit_last: int = 0
 
     @property
     def size(self):
@@ -257,6 +255,10 @@ class Image:
     @property
     def shape(self):
         return self.data.shape[:2]
+
+    def has_data(self, u, v):
+        rows, cols = self.shape
+        return 0 <= u < cols and 0 <= v < rows and bool(np.isfinite(self.data[v, u]).all())
 
     @property
     def z_sign(self):
@@ -355,7 +357,7 @@ class Detector:
         if not line.scaled and len(valid):
             eps = dtype(valid[0])
         with np.errstate(all="ignore"):
-            return [Segment(a, b, None, a, b) for a, b in split(line.y, line.x, eps, scale)]
+            return [Segment(a, b) for a, b in split(line.y, line.x, eps, scale)]
 
     def _of_line(self, line):
         segments = self.segments(line)
@@ -366,7 +368,7 @@ class Detector:
         else:
             for s in segments:
                 s.curve = self._fit(line, s)
-            for refinement in REFINEMENTS:
+            for refinement in REFINEMENTS if self.p.mergeSignificance > 0 else ():
                 segments = getattr(self, "_" + refinement)(line, segments)
         found = []
         for left, right in pairwise(segments):
@@ -376,14 +378,14 @@ class Detector:
                     found.append(candidate)
         return found
 
-    def _fit(self, line, s, margin=0):
-        k = np.arange(s.first + margin, s.last + 1 - margin)
+    def _fit(self, line, s):
+        k = np.arange(s.first, s.last + 1)
         sigma = line.sigma[s.first + s.size // 2]
         return least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
 
     def _merged(self, line, segments):
         limit = self.p.mergeSignificance**2
-        while limit > 0 and len(segments) > 1:
+        while len(segments) > 1:
             costs, unions = [], []
             for left, right in pairwise(segments):
                 union = Segment(left.first, right.last)
@@ -403,39 +405,32 @@ class Detector:
             segments = [*segments[:i], unions[i], *segments[i + 2 :]]
         return segments
 
-    def _margins_left_out(self, line, segments):
-        for s in segments:
-            margin = min(self.p.margin, (s.size - MARGIN_KEEPS) // 2)
-            if margin > 0:
-                s.curve = self._fit(line, s, margin)
-        return segments
-
-    def _fillets_dissolved(self, line, segments):
+    def _dissolved(self, line, segments):
         segments = list(segments)
         i = 1
         while i + 1 < len(segments):
-            left, s, right = segments[i - 1 : i + 2]
-            cut = self._fillet_cut(line, left, s, right)
-            if cut is None:
+            pair = self._without(line, *segments[i - 1 : i + 2])
+            if pair is None:
                 i += 1
             else:
-                left.last, right.first = cut, cut + 1
-                del segments[i]
+                segments[i - 1 : i + 2] = pair
+                i = max(1, i - 1)
         return segments
 
-    def _fillet_cut(self, line, left, s, right):
-        if s.size > min(self.p.maxFillet, left.size, right.size):
-            return None
+    def _without(self, line, left, s, right):
+        """The outer two of three segments with the samples of the middle one, or None."""
         if not _adjacent(line, left, s) or not _adjacent(line, s, right):
             return None
         x = meeting(left.curve, right.curve, (float(line.x[s.first]) + float(line.x[s.last])) / 2)
         if x is None or not line.x[s.first - 1] <= x <= line.x[s.last + 1]:
             return None
-        for k in range(s.first, s.last + 1):
-            curve = left.curve if line.x[k] <= x else right.curve
-            if abs(float(line.y[k]) - curve.value(float(line.x[k]))) > FILLET_TOLERANCE * line.tolerance[k]:
-                return None
-        return max([s.first - 1] + [k for k in range(s.first, s.last + 1) if line.x[k] <= x])
+        cut = max([s.first - 1] + [k for k in range(s.first, s.last + 1) if line.x[k] <= x])
+        pair, sigma = [Segment(left.first, cut), Segment(cut + 1, right.last)], line.sigma[s.first + s.size // 2]
+        for part in pair:
+            k = np.arange(part.first, part.last + 1)
+            part.curve = least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
+        rise = sum(p.curve.sum_squares for p in pair) - sum(p.curve.sum_squares for p in (left, s, right))
+        return pair if rise < (STRADDLING * self.p.mergeSignificance * sigma) ** 2 else None
 
     def _position(self, line, left, right):
         """Pixels before and after the edge, its abscissa, its place in samples, and whether the curves meet there."""
@@ -547,10 +542,40 @@ class Neighbourhood:
         if not params.minSignificance > 0 and params.crease != CREASE_NORMAL:
             return self.found
         joint = [replace(c, significance=self._joint_significance(c)) for c in self.found]
-        kept = [c for c in joint if c.significance >= params.minSignificance]
-        if params.crease != CREASE_NORMAL:
-            return kept
-        return Neighbourhood(kept, self.image)._with_normals()
+        kept = Neighbourhood([c for c in joint if c.significance >= params.minSignificance], self.image)
+        for _ in range(ALIGN_ROUNDS):
+            kept = Neighbourhood([kept._aligned(c) for c in kept.found], self.image)
+        return kept._with_normals() if params.crease == CREASE_NORMAL else kept.found
+
+    def _common_line(self, c, share=1.0):
+        """Unit normal of the line on which a candidate and its neighbours lie, and its distance; None for a point."""
+        near = list(self._near(c))
+        w = np.array([weight for _, weight in near])
+        at = np.array([(n.x - c.x, n.y - c.y) for n, _ in near])
+        mean = np.average(at, axis=0, weights=w)
+        spread = (w[:, None] * (at - mean)).T @ (at - mean) / w.sum()
+        if not np.trace(spread) > share * LEAST_SPREAD:
+            return None
+        across = np.linalg.eigh(spread)[1][:, 0]
+        return across, float(across @ mean)
+
+    def _aligned(self, c):
+        """A crease moved along its scan line onto the line it has in common with its neighbours."""
+        line = self._common_line(c) if c.crease > 0 and not c.kind & EDGE_JUMP else None
+        if line is None:
+            return c
+        across, distance = line
+        dx, dy = STEPS[c.direction]
+        slope = dx * across[0] + dy * across[1]
+        if abs(slope) < LEAST_SLOPE or abs(distance / slope) > self.image.params.maxShift:
+            return c
+        x, y = c.x + distance / slope * dx, c.y + distance / slope * dy
+        u = math.floor(x) if dx else round(x)
+        v = math.floor(y) if dy > 0 else math.ceil(y) if dy < 0 else round(y)
+        pixels = ((u, v), (u + dx, v + dy))
+        if not all(self.image.has_data(*pixel) for pixel in pixels):
+            return c
+        return replace(c, x=x, y=y, pixels=pixels)
 
     def _near(self, c):
         """Candidates of a common kind within reach, with weights."""
@@ -580,13 +605,12 @@ class Neighbourhood:
         return angles[0] if math.isclose(*angles, rel_tol=TIE) else math.nan
 
     def _normal_angle(self, c, share, turned):
+        line = self._common_line(c, share)
+        if line is None:
+            return None
         near = list(self._near(c))
         w = np.array([weight for _, weight in near])
-        at = np.array([(n.x - c.x, n.y - c.y) for n, _ in near])
-        spread = np.cov(at.T, aweights=w, ddof=0) if len(near) > 1 else np.zeros((2, 2))
-        if not np.trace(spread) > share * LEAST_SPREAD:
-            return None
-        across = np.linalg.eigh(spread)[1][:, 0]
+        across = line[0]
         across = across + turned * np.array([-across[1], across[0]])
         normals = []
         for side in (0, 1):
@@ -619,12 +643,12 @@ def edge_points(image):
     return Detector(image).candidates()
 
 
-def edge_strength(image):
+def edge_strength(image, candidates):
     """jump, crease, kind, significance of every pixel."""
     rows, cols = image.shape
     jump, crease, significance = (np.zeros((rows, cols)) for _ in range(3))
     kind = np.zeros((rows, cols), np.uint8)
-    for c in edge_points(image):
+    for c in candidates:
         for (u, v), occluding in zip(c.pixels, (EDGE_OCCLUDING, EDGE_OCCLUDED), strict=True):
             if c.kind & EDGE_JUMP:
                 kind[v, u] |= EDGE_JUMP | (EDGE_OCCLUDING if c.kind & occluding else EDGE_OCCLUDED)
@@ -639,12 +663,10 @@ def edge_strength(image):
 
 
 def beside_invalid(image):
-    data = image.data if image.data.ndim == 2 else image.data.sum(axis=2)
-    valid = np.isfinite(data)
     rows, cols = image.shape
     beside = np.zeros((rows, cols), bool)
     for v in range(rows):
         for u in range(cols):
-            around = valid[max(0, v - 1) : v + 2, max(0, u - 1) : u + 2]
-            beside[v, u] = valid[v, u] and not around.all()
+            around = [(i, j) for i in (u - 1, u, u + 1) for j in (v - 1, v, v + 1) if 0 <= i < cols and 0 <= j < rows]
+            beside[v, u] = image.has_data(u, v) and not all(image.has_data(*pixel) for pixel in around)
     return beside
