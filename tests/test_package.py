@@ -140,7 +140,7 @@ def test_source_folder_without_the_compiled_module_says_so(tmp_path):
     (source / "core").mkdir(parents=True)
     shutil.copy(PACKAGE / "__init__.py", source)
     code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import rangeedge"
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    run = subprocess.run([sys.executable, "-S", "-c", code], capture_output=True, text=True, check=False)
     assert "ImportError: this is the source folder of rangeedge" in run.stderr
 
 
