@@ -365,9 +365,11 @@ void Grower::dissolve() {
             total[i].pixels += border.pixels;
             total[i].open += border.open;
         }
-    for (const auto& [i, border] : total) {
-        const auto larger = [&](int j) { return is_small(i, j); };
+    for (const auto& entry : total) {
+        const int i = entry.first;
+        const Border& border = entry.second;
         const Pixels& others = around[i];
+        const auto larger = [&](int j) { return is_small(i, j); };
         if (border.open > least_open * border.pixels && region(i) == i &&
             std::any_of(others.begin(), others.end(), larger))
             pixels[i];

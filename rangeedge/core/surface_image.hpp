@@ -75,8 +75,8 @@ public:
     // A plane unless a quadratic is much better.
     Surface surface_of(const SurfaceSums& sums) const;
     bool is_flat(const Surface& surface) const;
-    // Two planes that meet in a crease describe some sets of pixels better than a quadratic: whether so, and which pixels
-    // lie on which.
+    // Two planes that meet in a crease describe some sets of pixels better than a quadratic: whether so, and which
+    // pixels lie on which.
     bool split_roof(const Pixels& pixels, const Surface& curved, Pixels& first, Pixels& second) const;
     // Whether two surfaces agree between two neighbours, within some standard deviations and an angle.
     bool agree(int p, int q, const Surface& a, const Surface& b, double tolerance, double cosine) const;
