@@ -189,16 +189,12 @@ def _deviation_by_depth(differences: np.ndarray, inverse: np.ndarray) -> tuple[n
         inside = which == k
         z = 1 / float(np.median(inverse[inside]))
         depths.append(z)
-        sigmas.append(_trimmed_deviation(differences[inside]) * z * z)
+        sigmas.append(max(_trimmed_deviation(differences[inside]) * z * z, _FINEST * z))
     return np.array(depths), np.array(sigmas)
 
 
 def _fitted(z: np.ndarray, sigma: np.ndarray) -> tuple[float, float]:
-    """a, c >= 0 of sigma = a + c z^2, by least squares of relative errors."""
-    seen = sigma > 0
-    if not seen.any():
-        return 0.0, 0.0
-    z, sigma = z[seen], sigma[seen]
+    """a, c >= 0 of sigma = a + c z^2, by least squares of relative errors: quiet depths count, not those of edges."""
     columns = np.stack([np.ones_like(z), z * z], axis=1) / sigma[:, None]
     both = np.linalg.lstsq(columns, np.ones_like(z), rcond=None)[0]
     if (both >= 0).all():

@@ -263,7 +263,8 @@ std::vector<std::pair<int, int>> Grower::contacts() {
 
 Grower::Borders Grower::borders(const std::vector<std::pair<int, int>>& contacts) {
     Borders found;
-    const double rough = std::cos(3 * parameters_.smooth_angle * degree), fine = std::cos(parameters_.smooth_angle * degree);
+    const double fine = std::cos(parameters_.smooth_angle * degree);
+    const double rough = std::cos(3 * parameters_.smooth_angle * degree);
     for (const auto& [p, q] : contacts) {
         const int a = owner(p), b = owner(q);
         if (region(a) == region(b)) continue;
@@ -366,7 +367,9 @@ void Grower::dissolve() {
         }
     for (const auto& [i, border] : total) {
         const auto larger = [&](int j) { return is_small(i, j); };
-        if (border.open > least_open * border.pixels && region(i) == i && std::any_of(around[i].begin(), around[i].end(), larger))
+        const Pixels& others = around[i];
+        if (border.open > least_open * border.pixels && region(i) == i &&
+            std::any_of(others.begin(), others.end(), larger))
             pixels[i];
     }
     for_pixels([&](int p) {
