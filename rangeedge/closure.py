@@ -139,8 +139,8 @@ def _places(frame: RangeFrame) -> tuple[np.ndarray | None, np.ndarray | None, tu
     if frame.projective:
         with np.errstate(divide="ignore", invalid="ignore"):
             x, y = x / (points @ axis), y / (points @ axis)
-    steps = np.concatenate([np.abs(np.diff(x, axis=1)).ravel(), np.abs(np.diff(y, axis=0)).ravel()])
-    steps = steps[np.isfinite(steps) & (steps > 0)]
+    steps = np.concatenate([np.hypot(np.diff(x, axis=k), np.diff(y, axis=k)).ravel() for k in (0, 1)])
+    steps = steps[steps > 0]  # and so not NaN
     spacing = float(np.median(steps)) if len(steps) else 1.0
     to_plane = (spacing, 0.0, 0.0, 0.0, spacing, 0.0)
     return (x / spacing).astype(np.float32), (y / spacing).astype(np.float32), to_plane

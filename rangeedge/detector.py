@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from ._args import array, boolean, camera_matrix, deliver, described, error, errors_of, fail, number, pixel_size
+from ._args import array, boolean, camera_matrix, deliver, described, error, errors_of, fail, number, pixel_size, threshold
 from ._constants import EDGE_OCCLUDING
 from .edges import (
     EdgeStrength,
@@ -31,7 +31,7 @@ from .thinning import thinEdges
 
 CREASE_THRESHOLD = 30.0
 HYSTERESIS = 1.0
-MIN_LENGTH = 6
+MIN_LENGTH = 5
 
 _SUFFIXES = (".xml", ".yml", ".yaml", ".json")  # by which cv2.FileStorage knows the format
 
@@ -134,9 +134,21 @@ def selected_of(
     jump = np.where(strength.kind & EDGE_OCCLUDING, strength.jump, np.float32(0))
     least = 0.0 if jumpThreshold is None else jumpThreshold
     with errors_of(func):
+        creaseThreshold = threshold(func, "creaseThreshold", creaseThreshold)
+        low = creaseThreshold * number(func, "hysteresis", hysteresis, 0, 1, above=True)
+        crease = _unfrayed(strength.crease, low)
         return selectEdges(
-            jump, strength.crease, least, creaseThreshold, hysteresis=hysteresis, minLength=minLength, dynamic=dynamic
+            jump, crease, least, creaseThreshold, hysteresis=hysteresis, minLength=minLength, dynamic=dynamic
         )
+
+
+def _unfrayed(crease: np.ndarray, least: float) -> np.ndarray:
+    """Creases without stray pixels: of the nine around one that stays, four are at least as strong as `least`."""
+    if min(crease.shape) < 3:
+        return crease
+    strong = (crease >= least).view(np.uint8)
+    around = cv2.boxFilter(strong, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    return np.where(around >= 4, crease, np.float32(0))
 
 
 def createScanLineDetector(params: ScanLineParams | None = None) -> ScanLineDetector:

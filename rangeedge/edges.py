@@ -100,7 +100,7 @@ class ScanLineParams:
     crease: int = CREASE_NORMAL
     maxShift: float = 4.0
     maxGap: int = 8
-    mergeSignificance: float = 5.5
+    mergeSignificance: float = 5.0
     minSignificance: float = 12.0
 
     def __post_init__(self) -> None:

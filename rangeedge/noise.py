@@ -18,6 +18,8 @@ _WINDOWS = 1 << 15  # along rows, and along columns, that an estimate rests on a
 _BIN_SIZE = 50  # differences that a bin needs
 _TRIM = 0.75  # share of the differences, the small ones, that the estimate rests on
 _TRIMMED_NORMAL = 0.607  # deviation of a normal variable within its central 75 %
+_QUANTISED = 0.05  # share of differences other than zero that tells steps from edges
+_LEAST_MOVED = 0.05  # quantile of these that stands for one step
 _FINEST = 1e-5  # of the distance, or of the range of heights: no range sensor resolves more
 
 
@@ -171,7 +173,14 @@ def _trimmed_deviation(differences: np.ndarray) -> float:
     if kept == 0:
         return 0.0
     small = np.partition(differences, kept - 1)[:kept]
-    return float(np.sqrt(np.mean(np.square(small, dtype=np.float64)))) / _TRIMMED_NORMAL
+    sigma = float(np.sqrt(np.mean(np.square(small, dtype=np.float64)))) / _TRIMMED_NORMAL
+    # Where values are coarsely quantised most differences are zero and the others multiples of the step; the least of
+    # these, unless they are so few that they are edges, bounds the deviation by that of rounding.
+    moved = differences[differences > 0]
+    least = int(_LEAST_MOVED * len(moved))
+    if len(moved) < _QUANTISED * len(differences) or least >= len(moved):
+        return sigma
+    return max(sigma, float(np.partition(moved, least)[least]) * np.sqrt(20 / 12))
 
 
 def _extent(ordinates: np.ndarray) -> float:
@@ -189,16 +198,12 @@ def _deviation_by_depth(differences: np.ndarray, inverse: np.ndarray) -> tuple[n
         inside = which == k
         z = 1 / float(np.median(inverse[inside]))
         depths.append(z)
-        sigmas.append(_trimmed_deviation(differences[inside]) * z * z)
+        sigmas.append(max(_trimmed_deviation(differences[inside]) * z * z, _FINEST * z))
     return np.array(depths), np.array(sigmas)
 
 
 def _fitted(z: np.ndarray, sigma: np.ndarray) -> tuple[float, float]:
-    """a, c >= 0 of sigma = a + c z^2, by least squares of relative errors."""
-    seen = sigma > 0
-    if not seen.any():
-        return 0.0, 0.0
-    z, sigma = z[seen], sigma[seen]
+    """a, c >= 0 of sigma = a + c z^2, by least squares of relative errors: quiet depths count, not those of edges."""
     columns = np.stack([np.ones_like(z), z * z], axis=1) / sigma[:, None]
     both = np.linalg.lstsq(columns, np.ones_like(z), rcond=None)[0]
     if (both >= 0).all():

@@ -37,9 +37,9 @@ CURVED_SIGNIFICANCE = 5.0  # of the quadratic term
 STRADDLING = 2.0  # how much more, in significance, a segment across an edge may cost
 LONE_SIGNIFICANCE = 3.0
 JUMP_TOLERANCES = 2.0
-REACH, SPREAD, CAPPED, LONE_SHARE = 3, 1.5, 8.0, 1 / 3
+REACH, CAPPED, LONE_SHARE = 4.0, 8.0, 1 / 3  # pixels; standard deviations
 ALIGN_ROUNDS, LEAST_SLOPE = 2, 0.3
-LEAST_SPREAD, LEAST_DETERMINANT = 0.05, 0.02
+LEAST_SPREAD, LEAST_DIRECTIONS = 0.05, (0.02, 1e-9)
 SMALLEST = 1e-30
 
 TIE = 1e-5  # relative: closer comparisons count as decided by rounding
@@ -181,9 +181,8 @@ class Line:
     y: np.ndarray
     sigma: np.ndarray  # of the ordinates
     tolerance: np.ndarray
-    scaled: bool
+    scale: np.ndarray | None  # inverse tolerances, where they differ
     place: Any = None  # abscissa to the position (X, Y) in the plane of the image
-    axes: Any = None  # two vectors: along the line in the plane of the image, and the viewing axis
 
     def tangent(self, x, value, slope):
         """Derivative by the abscissa of a curve in space, the ray to its point, and how the ray moves."""
@@ -273,14 +272,26 @@ class Image:
         depth = 1 / ordinate if self.projective else np.abs(ordinate)
         to_ordinate = ordinate**2 if self.projective else np.ones_like(ordinate)
         sigma = np.maximum(self.noise.correlation * self.noise(depth) * to_ordinate, SMALLEST)
-        if self.params.eps is None:
-            tolerance = self.params.epsFactor * sigma
-            n = self.noise
-            scaled = n.b > 0 or (n.a > 0 if self.projective else n.c > 0)
-        else:
-            tolerance = np.maximum(self.params.eps * to_ordinate, SMALLEST)
+        scale = self._inverse_tolerances(y)
+        tolerance = 1 / scale.astype(np.float64)
+        n = self.noise
+        scaled = n.b != 0 or (n.a if self.projective else n.c) != 0
+        if self.params.eps is not None:
             scaled = self.projective
-        return Line(pixels, direction, self.projective, x, y, sigma, tolerance, scaled, place)
+        elif not scaled:
+            tolerance = self.params.epsFactor * sigma
+        if not scaled and self.params.eps is not None:
+            tolerance = np.full(len(y), self.params.eps)
+        return Line(pixels, direction, self.projective, x, y, sigma, tolerance, scale if scaled else None, place)
+
+    def _inverse_tolerances(self, y):
+        """In the precision of the image; of noise as a polynomial: sigma(1 / q) q^2 = a q^2 + b q + c."""
+        n, eps, real = self.noise, self.params.eps, y.dtype.type
+        factor = real(self.params.epsFactor * n.correlation if eps is None else eps)
+        a, b, c = (factor * real(v) for v in ((n.a, n.b, n.c) if eps is None else (1.0, 0.0, 0.0)))
+        y = y if self.projective else abs(y)
+        tolerance = (a * y + b) * y + c if self.projective else a + (b + c * y) * y
+        return 1 / np.where(tolerance > real(SMALLEST), tolerance, real(SMALLEST))
 
     def _grid(self, pixels):
         u, v = np.array(pixels).T
@@ -350,14 +361,9 @@ class Detector:
         return Neighbourhood(found, self.image).pooled()
 
     def segments(self, line):
-        dtype = line.y.dtype.type
-        scale = (1 / line.tolerance).astype(dtype) if line.scaled else None
-        eps = dtype(1 if line.scaled else line.tolerance[0] if len(line.tolerance) else 1)
-        valid = line.tolerance[np.isfinite(line.tolerance)]
-        if not line.scaled and len(valid):
-            eps = dtype(valid[0])
+        eps = line.y.dtype.type(1 if line.scale is not None else np.nanmax(line.tolerance, initial=0))
         with np.errstate(all="ignore"):
-            return [Segment(a, b) for a, b in split(line.y, line.x, eps, scale)]
+            return [Segment(a, b) for a, b in split(line.y, line.x, eps, line.scale)]
 
     def _of_line(self, line):
         segments = self.segments(line)
@@ -579,17 +585,10 @@ class Neighbourhood:
 
     def _near(self, c):
         """Candidates of a common kind within reach, with weights."""
-        rows, cols = self.image.shape
-
-        def cell(n):  # half away from zero
-            u, v = math.floor(np.float32(n.x) + 0.5), math.floor(np.float32(n.y) + 0.5)
-            return min(max(u, 0), cols - 1), min(max(v, 0), rows - 1)
-
-        u, v = cell(c)
         for n in self.found:
-            i, j = cell(n)
-            if abs(i - u) <= REACH and abs(j - v) <= REACH and n.kind & c.kind & KINDS:
-                yield n, math.exp(-((n.x - c.x) ** 2 + (n.y - c.y) ** 2) / (2 * SPREAD**2))
+            rest = 1 - ((n.x - c.x) ** 2 + (n.y - c.y) ** 2) / REACH**2
+            if rest > 0 and n.kind & c.kind & KINDS:
+                yield n, rest**2
 
     def _joint_significance(self, c):
         evidence = sum(weight * min(n.significance, CAPPED) ** 2 for n, weight in self._near(c))
@@ -624,7 +623,8 @@ class Neighbourhood:
                 values.append(value)
             rows, slopes, weights = np.array(rows), np.array(slopes), np.array(weights)
             a = rows.T @ (weights[:, None] * rows)
-            if not np.linalg.det(a) > share * LEAST_DETERMINANT * a[0, 0] * a[1, 1] or not a[0, 0] * a[1, 1] > 0:
+            bounds = np.array([a[0, 0] * a[1, 1], np.trace(a) ** 2]) * LEAST_DIRECTIONS
+            if not (np.linalg.det(a) > share * bounds).all():
                 return None
             gradient = np.linalg.solve(a, rows.T @ (weights * slopes))
             if self.image.projective:

@@ -326,7 +326,8 @@ class TestBadInput:
 
     def test_no_traceback_in_a_process_of_its_own(self, tmp_path):
         argv = [sys.executable, "-m", "rangeedge", "detect", "missing.png", "--out", str(tmp_path / "out")]
-        ended = subprocess.run(argv, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": _root()})
+        environment = {**os.environ, "PYTHONPATH": _root()}
+        ended = subprocess.run(argv, capture_output=True, text=True, cwd=tmp_path, env=environment)
         assert ended.returncode == 2
         assert ended.stderr.startswith("rangeedge: error:")
         assert "Traceback" not in ended.stderr

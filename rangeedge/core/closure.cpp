@@ -38,7 +38,8 @@ void verify_surfaces(const RangeMap& map, const std::int32_t* labels, int count,
             const int p = image.index(row, col);
             if (label > 0 && image.valid(p)) pixels[static_cast<std::size_t>(label)].push_back(p);
         }
-    for (std::size_t i = 0; i < pixels.size(); ++i) accepted[i] = i > 0 && is_surface(image, pixels[i], tolerance, share);
+    accepted[0] = 0;
+    for (std::size_t i = 1; i < pixels.size(); ++i) accepted[i] = is_surface(image, pixels[i], tolerance, share);
 }
 
 }  // namespace rangeedge

@@ -125,7 +125,8 @@ struct Gradient {
     // The surface's normal; false where the directions do not fix it.
     bool normal(bool projective, const double place[2], Vector& n) const {
         const double determinant = xx * yy - xy * xy;
-        if (!(determinant > 0.02 * xx * yy) || !(xx * yy > 0)) return false;
+        // Parallel directions, apart from rounding, or nearly so.
+        if (!(determinant > 1e-9 * (xx + yy) * (xx + yy)) || !(determinant > 0.02 * xx * yy)) return false;
         const double gx = (yy * xm - xy * ym) / determinant, gy = (xx * ym - xy * xm) / determinant;
         // q = gx X + gy Y + g0 is the plane gx x + gy y + g0 z = 1.
         n = {gx, gy, projective ? value / weight - gx * place[0] - gy * place[1] : 1};

@@ -263,7 +263,8 @@ std::vector<std::pair<int, int>> Grower::contacts() {
 
 Grower::Borders Grower::borders(const std::vector<std::pair<int, int>>& contacts) {
     Borders found;
-    const double rough = std::cos(3 * parameters_.smooth_angle * degree), fine = std::cos(parameters_.smooth_angle * degree);
+    const double fine = std::cos(parameters_.smooth_angle * degree);
+    const double rough = std::cos(3 * parameters_.smooth_angle * degree);
     for (const auto& [p, q] : contacts) {
         const int a = owner(p), b = owner(q);
         if (region(a) == region(b)) continue;
@@ -364,9 +365,13 @@ void Grower::dissolve() {
             total[i].pixels += border.pixels;
             total[i].open += border.open;
         }
-    for (const auto& [i, border] : total) {
+    for (const auto& entry : total) {
+        const int i = entry.first;
+        const Border& border = entry.second;
+        const Pixels& others = around[i];
         const auto larger = [&](int j) { return is_small(i, j); };
-        if (border.open > least_open * border.pixels && region(i) == i && std::any_of(around[i].begin(), around[i].end(), larger))
+        if (border.open > least_open * border.pixels && region(i) == i &&
+            std::any_of(others.begin(), others.end(), larger))
             pixels[i];
     }
     for_pixels([&](int p) {

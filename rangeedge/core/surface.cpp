@@ -40,9 +40,11 @@ SurfaceSums SurfaceSums::moved(double x0, double y0, double base) const {
         for (int j = 0; j <= degree; ++j)
             for (int k = 0, i = degree - j; k <= i; ++k)
                 for (int l = 0; l <= j; ++l) {
-                    const double factor = choose[i][k] * a[static_cast<std::size_t>(i - k)] * choose[j][l] * b[static_cast<std::size_t>(j - l)];
-                    m.power_[place(i, j)] += factor * power_[place(k, l)];
-                    if (degree <= 2) m.product_[place(i, j)] += factor * (product_[place(k, l)] + d * power_[place(k, l)]);
+                    const std::size_t from = place(k, l), to = place(i, j);
+                    const double factor = choose[i][k] * a[static_cast<std::size_t>(i - k)] * choose[j][l] *
+                                          b[static_cast<std::size_t>(j - l)];
+                    m.power_[to] += factor * power_[from];
+                    if (degree <= 2) m.product_[to] += factor * (product_[from] + d * power_[from]);
                 }
     m.square_ = square_ + d * (2 * product_[0] + d * power_[0]);
     return m;
@@ -50,7 +52,8 @@ SurfaceSums SurfaceSums::moved(double x0, double y0, double base) const {
 
 SurfaceSums SurfaceSums::joined(const SurfaceSums& other) const {
     const double wa = power_[0], wb = other.power_[0], share = wa + wb > 0 ? wb / (wa + wb) : 0;
-    const double x = x0_ + share * (other.x0_ - x0_), y = y0_ + share * (other.y0_ - y0_), base = base_ + share * (other.base_ - base_);
+    const double x = x0_ + share * (other.x0_ - x0_), y = y0_ + share * (other.y0_ - y0_);
+    const double base = base_ + share * (other.base_ - base_);
     SurfaceSums sum = moved(x, y, base);
     const SurfaceSums b = other.moved(x, y, base);
     for (std::size_t k = 0; k < power_.size(); ++k) sum.power_[k] += b.power_[k];

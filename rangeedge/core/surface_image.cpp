@@ -2,6 +2,7 @@
 #include "surface_image.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 namespace rangeedge {
@@ -21,11 +22,16 @@ const double pi = std::acos(-1.0);
 
 SurfaceImage::SurfaceImage(const RangeMap& map, double lateral)
     : rows_(map.rows), cols_(map.cols), projective_(map.projective), lateral_(lateral), offset_(map.offset),
-      to_plane_(map.to_plane), pixel_(static_cast<std::size_t>(size())), state_(static_cast<std::size_t>(size()), none) {
+      to_plane_(map.to_plane), pixel_(static_cast<std::size_t>(size())),
+      state_(static_cast<std::size_t>(size()), none) {
     float low = 0, high = 0;
     for (int k = 0; k < rows_ * cols_; ++k)
-        if (std::isfinite(map.ordinate[k])) low = std::min(low, map.ordinate[k]), high = std::max(high, map.ordinate[k]);
-    const double least = resolution * (static_cast<double>(high) - static_cast<double>(low) + std::abs(offset_)) + 1e-300;
+        if (std::isfinite(map.ordinate[k])) {
+            low = std::min(low, map.ordinate[k]);
+            high = std::max(high, map.ordinate[k]);
+        }
+    const double extent = static_cast<double>(high) - static_cast<double>(low) + std::abs(offset_);
+    const double least = std::max(resolution * extent, std::numeric_limits<double>::min());
     const auto sigma = [&](int k) {
         const double ordinate = offset_ + static_cast<double>(map.ordinate[k]);
         const double z = projective_ ? 1 / ordinate : std::abs(ordinate);

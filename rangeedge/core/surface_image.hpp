@@ -28,7 +28,7 @@ struct RangeMap {
 
 using Pixels = std::vector<int>;
 
-constexpr double lateral_deviation = 0.35;  // pixels: by how much a sample may stem from beside its line of sight
+constexpr double lateral_deviation = 0.15;  // pixels: by how much a sample may stem from beside its line of sight
 constexpr std::size_t least_pixels = 12;  // of a surface
 constexpr std::size_t least_curved = 40;  // of a quadratic
 
@@ -75,7 +75,8 @@ public:
     // A plane unless a quadratic is much better.
     Surface surface_of(const SurfaceSums& sums) const;
     bool is_flat(const Surface& surface) const;
-    // Two planes that meet in a crease describe some sets of pixels better than a quadratic does; if so, which is which.
+    // Two planes that meet in a crease describe some sets of pixels better than a quadratic: whether so, and which
+    // pixels lie on which.
     bool split_roof(const Pixels& pixels, const Surface& curved, Pixels& first, Pixels& second) const;
     // Whether two surfaces agree between two neighbours, within some standard deviations and an angle.
     bool agree(int p, int q, const Surface& a, const Surface& b, double tolerance, double cosine) const;
