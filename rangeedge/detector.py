@@ -13,7 +13,19 @@ from typing import TYPE_CHECKING, Any
 import cv2
 import numpy as np
 
-from ._args import array, boolean, camera_matrix, deliver, described, error, errors_of, fail, number, pixel_size, threshold
+from ._args import (
+    array,
+    boolean,
+    camera_matrix,
+    deliver,
+    described,
+    error,
+    errors_of,
+    fail,
+    number,
+    pixel_size,
+    threshold,
+)
 from ._constants import EDGE_OCCLUDING
 from .edges import (
     EdgeStrength,
@@ -59,7 +71,8 @@ def detectEdges(
 
         jump >= jumpThreshold on the nearer side of the jump,  or  crease >= creaseThreshold,
 
-    so the line along a jump lies on the surface that occludes the other.
+    so the line along a jump lies on the surface that occludes the other. A crease pixel counts only where three of its
+    neighbours are creases as well, lest lines fray.
 
     Parameters
     ----------

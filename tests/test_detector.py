@@ -12,7 +12,10 @@ import rangeedge
 from rangeedge import (
     DIR_COLS,
     DIR_ROWS,
+    EDGE_JUMP,
+    EDGE_OCCLUDED,
     EDGE_OCCLUDING,
+    EdgeStrength,
     NoiseModel,
     ScanLineParams,
     createScanLineDetector,
@@ -22,7 +25,7 @@ from rangeedge import (
     selectEdges,
     thinEdges,
 )
-from rangeedge.detector import ScanLineDetector
+from rangeedge.detector import ScanLineDetector, selected_of
 
 K = np.array([[200, 0, 47.5], [0, 210, 35.5], [0, 0, 1]])
 FORMATS = ["xml", "yml", "yaml", "json"]
@@ -97,6 +100,19 @@ def test_detect_edges_is_strength_selection_thinning(scene):
         assert found.dtype == np.uint8
         assert set(np.unique(found)) <= {0, 255}
         np.testing.assert_array_equal(found, expected)
+
+
+def test_stray_crease_pixels_do_not_count_nor_jumps_on_the_farther_side():
+    crease, jump = np.zeros((2, 9, 9), np.float32)
+    kind = np.zeros((9, 9), np.uint8)
+    crease[4:6, 1:8] = 40
+    crease[1, 3:5] = 40
+    jump[8] = jump[7] = 1
+    kind[7], kind[8] = EDGE_OCCLUDING | EDGE_JUMP, EDGE_OCCLUDED | EDGE_JUMP
+    edges = selected_of("test", EdgeStrength(jump, crease, kind, jump), minLength=1)
+    expected = np.zeros((9, 9), np.uint8)
+    expected[4:6, 1:8] = expected[7] = 255
+    np.testing.assert_array_equal(edges, expected)
 
 
 def test_rim_of_the_nearer_surface_is_the_jump_edge(scene):
