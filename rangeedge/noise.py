@@ -8,7 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ._args import error, number
+from ._args import described, error, fail, number
 from .geometry import RangeFrame, range_frame
 
 _LAG = 6  # samples: noise of neighbours this far apart counts as independent
@@ -223,7 +223,7 @@ def kernel_noise(func: str, noise: Any, frame: RangeFrame) -> tuple[tuple[float,
         return (noise.a, noise.b, noise.c, noise.correlation), None
     expected = f"a number, a NoiseModel, or a real array of shape {frame.shape}, > 0 at valid pixels"
     if noise.shape != frame.shape or noise.dtype.kind not in "iuf":
-        raise error(func, f"`noise` must be {expected}, got {noise.dtype} array of shape {noise.shape}", cv2.Error.StsBadSize)
+        raise fail(func, "noise", expected, described(noise), cv2.Error.StsBadSize)
     sigmas = np.ascontiguousarray(noise, dtype=np.float32)
     if not np.all((sigmas > 0) & np.isfinite(sigmas), where=frame.valid > 0):
         raise error(func, f"`noise` must be {expected}", cv2.Error.StsOutOfRange)
