@@ -31,6 +31,7 @@ from rangeedge import (
     MEASURE_MIDPOINT,
     NoiseModel,
     ScanLineParams,
+    detectEdges,
     edgePoints,
     edgeStrength,
 )
@@ -173,6 +174,12 @@ def test_huge_values_make_huge_jumps(dtype):
     np.testing.assert_allclose(strength.jump[:, 8:10], 2e30, rtol=1e-5)
     assert not strength.jump[:, :8].any()
     assert not strength.jump[:, 10:].any()
+
+
+def test_a_jump_too_large_for_single_precision_is_the_largest_number():
+    z = np.where(np.arange(20) < 9, -1e100, 1e100) * np.ones((12, 1))
+    assert (edgeStrength(z, noise=0.01).jump[:, 8:10] == np.finfo(np.float32).max).all()
+    assert detectEdges(z, noise=0.01)[:, 8:10].any(axis=1).all()
 
 
 @pytest.mark.parametrize("geometry", [dict(), dict(K=K)])

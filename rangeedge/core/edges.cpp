@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "approximation.hpp"
 #include "line.hpp"
@@ -94,7 +95,7 @@ private:
         Candidate c{};
         c.x = static_cast<float>(line.path.col + cut.sample * line.path.dcol);
         c.y = static_cast<float>(line.path.row + cut.sample * line.path.drow);
-        c.jump = static_cast<float>(jump);
+        c.jump = static_cast<float>(std::min(jump, static_cast<double>(std::numeric_limits<float>::max())));
         c.crease = static_cast<float>(crease);
         const double significance = jump > 0 ? std::max(jump_significance, crease_significance) : crease_significance;
         c.significance = std::min(static_cast<float>(significance), endless);
