@@ -2,6 +2,7 @@
 #include "edges.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -17,6 +18,8 @@ constexpr double degrees = 57.295779513082320877;
 constexpr double lone_significance = 3;  // of a candidate by itself, before its neighbours are asked
 constexpr double jump_tolerances = 2;    // what tells a jump from the approximation's own error
 
+constexpr int strip_lines = 16;  // read together: samples of a cache line
+
 // Where an edge is: between two samples, at an abscissa, also counted in samples.
 struct Cut {
     int before, after;
@@ -30,8 +33,9 @@ public:
     LineDetector(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters, int direction)
         : cols_(image.cols), parameters_(parameters), reader_(image, noise, parameters), direction_(direction) {}
 
-    void detect(const Path& path, Line<T>& line, Approximation& a, std::vector<Candidate>& candidates) const {
-        reader_.read(path, line);
+    void read(int first, std::vector<Line<T>>& lines) const { reader_.read(direction_, first, lines); }
+
+    void detect(const Line<T>& line, Approximation& a, std::vector<Candidate>& candidates) const {
         approximate(line, parameters_, a);  // P 4.1
         for (std::size_t i = 0; i + 1 < a.segments.size(); ++i) {
             if (a.segments[i + 1].first - a.segments[i].last - 1 > parameters_.max_gap) continue;
@@ -126,46 +130,37 @@ private:
     int direction_;
 };
 
-template <class T>
-Pixels pixels_of(const RangeImage<T>& image) {
-    const auto count = static_cast<std::size_t>(image.rows) * static_cast<std::size_t>(image.cols);
-    Pixels pixels{image.rows, image.cols, std::vector<std::uint8_t>(count)};
-    for (std::size_t i = 0; i < count; ++i) {
-        T value = image.ordinate ? image.ordinate[i] : T(0);
-        if (image.points)
-            for (std::size_t k = 0; k < 3; ++k) value += image.points[3 * i + k];
-        pixels.valid[i] = std::isfinite(value);
-    }
-    return pixels;
-}
-
 }  // namespace
 
 template <class T>
 std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters) {
-    struct Scratch {
-        Line<T> line;
-        Approximation approximation;
+    // Neighbouring lines of one direction. Any thread may take any strip: they are many, and what they cost differs.
+    struct Strip {
+        int direction, first, count;
         std::vector<Candidate> found;
     };
-    std::vector<Scratch> scratch(static_cast<std::size_t>(std::max(1, parameters.threads)));
-    std::vector<Candidate> candidates;
+    std::vector<Strip> strips;
     for (int direction = 1; direction <= 8; direction *= 2) {
-        if (!(parameters.directions & direction)) continue;
-        const LineDetector<T> detector(image, noise, parameters, direction);
-        const int lines = line_count(direction, image.rows, image.cols);
-        parallel_for(lines, parameters.threads, [&](int begin, int end, int thread) {
-            Scratch& s = scratch[static_cast<std::size_t>(thread)];
-            s.found.clear();
-            for (int i = begin; i < end; ++i)
-                detector.detect(line_path(direction, i, image.rows, image.cols), s.line, s.approximation, s.found);
-        });
-        for (Scratch& s : scratch) {
-            candidates.insert(candidates.end(), s.found.begin(), s.found.end());
-            s.found.clear();
-        }
+        const int lines = parameters.directions & direction ? line_count(direction, image.rows, image.cols) : 0;
+        for (int first = 0; first < lines; first += strip_lines)
+            strips.push_back({direction, first, std::min(strip_lines, lines - first), {}});
     }
-    pool(candidates, pixels_of(image), image.projective, parameters);
+    std::atomic<std::size_t> taken{0};
+    const int threads = std::max(1, parameters.threads);
+    parallel_for(threads, threads, [&](int, int, int) {
+        std::vector<Line<T>> lines;
+        Approximation approximation;
+        for (std::size_t i; (i = taken++) < strips.size();) {
+            Strip& strip = strips[i];
+            const LineDetector<T> detector(image, noise, parameters, strip.direction);
+            lines.resize(static_cast<std::size_t>(strip.count));
+            detector.read(strip.first, lines);
+            for (const Line<T>& line : lines) detector.detect(line, approximation, strip.found);
+        }
+    });
+    std::vector<Candidate> candidates;
+    for (const Strip& strip : strips) candidates.insert(candidates.end(), strip.found.begin(), strip.found.end());
+    pool(candidates, image, parameters);
     return candidates;
 }
 

@@ -1,6 +1,7 @@
 // Edge candidates of a range image from its scan lines, and their combination (paper, sections 4.1 and 4.2).
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cmath>
 #include <cstdint>
 #include <vector>
 
@@ -16,6 +17,12 @@ struct RangeImage {
     bool projective;      // rays from one point; else parallel to `axis`
     double to_plane[6];   // pixel (u, v, 1) to normalised image coordinates, or to lengths on the grid
     double axis[3];       // viewing direction of `points`
+
+    bool valid_at(int col, int row) const {
+        if (col < 0 || row < 0 || col >= cols || row >= rows) return false;
+        const std::int64_t i = static_cast<std::int64_t>(row) * cols + col;
+        return std::isfinite(ordinate ? ordinate[i] : points[3 * i] + points[3 * i + 1] + points[3 * i + 2]);
+    }
 };
 
 // Standard deviation of a length z: a + b z + c z^2, or given for every pixel.

@@ -49,26 +49,49 @@ Path line_path(int direction, int i, int rows, int cols) {
 }
 
 template <class T>
-void LineReader<T>::read(const Path& path, Line<T>& line) const {
-    line.path = path;
-    line.cols = image_.cols;
-    line.projective = image_.projective;
-    line.irregular = image_.points != nullptr;
-    line.noise = noise_;
-    line.y.resize(static_cast<std::size_t>(path.size));
-    if (line.irregular)
-        read_points(line);
-    else
-        read_grid(line);
-    set_tolerance(line);
+void LineReader<T>::read(int direction, int first, std::vector<Line<T>>& lines) const {
+    const bool irregular = image_.points != nullptr;
+    for (std::size_t j = 0; j < lines.size(); ++j) {
+        Line<T>& line = lines[j];
+        line.path = line_path(direction, first + static_cast<int>(j), image_.rows, image_.cols);
+        line.cols = image_.cols;
+        line.projective = image_.projective;
+        line.irregular = irregular;
+        line.noise = noise_;
+        line.y.resize(static_cast<std::size_t>(line.path.size));
+        if (irregular)
+            read_points(line);
+        else
+            place(line);
+    }
+    if (!irregular) gather(lines);
+    for (Line<T>& line : lines) set_tolerance(line);
+}
+
+// A strip of some rows after the other, and in it line by line.
+template <class T>
+void LineReader<T>::gather(std::vector<Line<T>>& lines) const {
+    constexpr int strip = 16;
+    for (int top = 0; top < image_.rows; top += strip)
+        for (Line<T>& line : lines) {
+            const Path& path = line.path;
+            const std::int64_t stride = static_cast<std::int64_t>(path.drow) * image_.cols + path.dcol;
+            int first = 0, last = path.size;  // of the samples within the strip
+            if (path.drow == 0) {
+                if (path.row < top || path.row >= top + strip) continue;
+            } else {
+                const int k = path.drow > 0 ? top - path.row : path.row - (top + strip - 1);
+                first = std::max(first, k), last = std::min(last, k + strip);
+            }
+            const T* source = image_.ordinate + path.pixel(0, image_.cols);
+            T* y = line.y.data();
+            for (int k = first; k < last; ++k) y[k] = source[k * stride];
+        }
 }
 
 template <class T>
-void LineReader<T>::read_grid(Line<T>& line) const {
+void LineReader<T>::place(Line<T>& line) const {
     const Path& path = line.path;
-    const std::int64_t stride = static_cast<std::int64_t>(path.drow) * image_.cols + path.dcol;
-    const T* source = image_.ordinate + path.pixel(0, image_.cols);
-    for (std::size_t k = 0; k < line.y.size(); ++k) line.y[k] = source[static_cast<std::int64_t>(k) * stride];
     // The line's direction and the place of its first pixel, in the plane of the image.
     const double* p = image_.to_plane;
     const double du = p[0] * path.dcol + p[1] * path.drow, dv = p[3] * path.dcol + p[4] * path.drow;

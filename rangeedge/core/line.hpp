@@ -79,10 +79,13 @@ public:
     LineReader(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters)
         : image_(image), noise_{noise, image.projective}, parameters_(parameters) {}
 
-    void read(const Path& path, Line<T>& line) const;
+    // Makes lines[0] the line `first` of a direction, and so on with the next. Neighbouring lines that are read
+    // together share the cache lines of the image.
+    void read(int direction, int first, std::vector<Line<T>>& lines) const;
 
 private:
-    void read_grid(Line<T>& line) const;
+    void gather(std::vector<Line<T>>& lines) const;
+    void place(Line<T>& line) const;
     void read_points(Line<T>& line) const;
     void set_tolerance(Line<T>& line) const;
 

@@ -21,19 +21,31 @@ struct Vector {
     double x, y, z;
 };
 
-// Candidates by square cells of the image, for those near a given one.
+// A copy of the candidates by square cells of the image, for those near a given one.
 class Grid {
 public:
     Grid(const std::vector<Candidate>& candidates, int rows, int cols)
-        : candidates_(candidates), rows_(rows / cell_size + 1), cols_(cols / cell_size + 1),
-          start_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(cols_) + 1, 0), items_(candidates.size()) {
+        : rows_(rows / cell_size + 1), cols_(cols / cell_size + 1),
+          start_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(cols_) + 1, 0), places_(candidates.size()),
+          candidates_(candidates.size()) {
         for (const Candidate& c : candidates) ++start_[cell(column(c), row(c)) + 1];
         for (std::size_t p = 1; p < start_.size(); ++p) start_[p] += start_[p - 1];
         std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
         for (std::size_t i = 0; i < candidates.size(); ++i) {
             const Candidate& c = candidates[i];
-            items_[static_cast<std::size_t>(next[cell(column(c), row(c))]++)] = static_cast<std::int32_t>(i);
+            const auto k = static_cast<std::size_t>(next[cell(column(c), row(c))]++);
+            places_[k] = {c.x, c.y, c.kind & kinds, static_cast<std::int32_t>(i)};
+            candidates_[k] = c;
         }
+    }
+
+    // Calls visit(candidate, index in the vector that was copied) for all of them, cell by cell.
+    template <class Visit>
+    void for_each(int threads, Visit&& visit) const {
+        parallel_for(static_cast<int>(candidates_.size()), threads, [&](int begin, int end, int) {
+            for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k)
+                visit(candidates_[k], static_cast<std::size_t>(places_[k].index));
+        });
     }
 
     // Calls visit(candidate, weight) for c itself and every candidate within reach that shares a kind with it.
@@ -42,27 +54,50 @@ public:
         const int u = column(c), v = row(c);
         const int left = std::max(0, u - 1), right = std::min(cols_ - 1, u + 1);
         for (int y = std::max(0, v - 1); y <= std::min(rows_ - 1, v + 1); ++y) {
-            const auto first = start_[cell(left, y)], last = start_[cell(right, y) + 1];
-            for (auto k = first; k < last; ++k) {
-                const Candidate& n = candidates_[static_cast<std::size_t>(items_[static_cast<std::size_t>(k)])];
-                const float du = n.x - c.x, dv = n.y - c.y;
-                const float rest = 1 - (du * du + dv * dv) / (reach * reach);
-                if (rest > 0 && (n.kind & c.kind & kinds)) visit(n, rest * rest);
-            }
+            const auto last = start_[cell(right, y) + 1];
+            for (auto first = start_[cell(left, y)]; first < last; first += block_size)
+                visit_block(first, std::min(last, first + block_size), c, visit);
         }
     }
 
 private:
     static constexpr int cell_size = 4;  // pixels, no less than the reach
+    static constexpr int block_size = 64;
+
+    // What the search needs to know of a candidate.
+    struct Place {
+        float x, y;
+        int kind;
+        std::int32_t index;
+    };
+
+    // Lists those within reach before it visits them: a branch on each would be mispredicted too often.
+    template <class Visit>
+    void visit_block(std::int32_t first, std::int32_t last, const Candidate& c, Visit&& visit) const {
+        float weights[block_size];
+        std::int32_t near[block_size];
+        int count = 0;
+        for (auto k = first; k < last; ++k) {
+            const Place& n = places_[static_cast<std::size_t>(k)];
+            const float du = n.x - c.x, dv = n.y - c.y;
+            const float rest = 1 - (du * du + dv * dv) / (reach * reach);
+            weights[count] = rest * rest;
+            near[count] = k;
+            count += static_cast<int>(rest > 0) & static_cast<int>((n.kind & c.kind) != 0);
+        }
+        for (int i = 0; i < count; ++i) visit(candidates_[static_cast<std::size_t>(near[i])], weights[i]);
+    }
+
     int column(const Candidate& c) const { return std::min(std::max(static_cast<int>(c.x) / cell_size, 0), cols_ - 1); }
     int row(const Candidate& c) const { return std::min(std::max(static_cast<int>(c.y) / cell_size, 0), rows_ - 1); }
     std::size_t cell(int column, int row) const {
         return static_cast<std::size_t>(row) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(column);
     }
 
-    const std::vector<Candidate>& candidates_;
     int rows_, cols_;
-    std::vector<std::int32_t> start_, items_;
+    std::vector<std::int32_t> start_;
+    std::vector<Place> places_;
+    std::vector<Candidate> candidates_;
 };
 
 float joint_significance(const Grid& grid, const Candidate& c) {
@@ -130,7 +165,8 @@ Step step_of(const Candidate& c) {
 }
 
 // Moves a crease along its scan line onto the line it has in common with its neighbours, unless that leads off the data.
-void align(const Grid& grid, const Candidate& c, const Pixels& pixels, double max_shift, Candidate& moved) {
+template <class T>
+void align(const Grid& grid, const Candidate& c, const RangeImage<T>& image, double max_shift, Candidate& moved) {
     if ((c.kind & jump_bit) || !(c.crease > 0)) return;
     const CommonLine line = common_line(grid, c);
     const Step step = step_of(c);
@@ -141,11 +177,11 @@ void align(const Grid& grid, const Candidate& c, const Pixels& pixels, double ma
     const double x = static_cast<double>(c.x) + shift * step.dcol, y = static_cast<double>(c.y) + shift * step.drow;
     const int u = static_cast<int>(step.dcol ? std::floor(x) : std::round(x));
     const int v = static_cast<int>(step.drow > 0 ? std::floor(y) : step.drow < 0 ? std::ceil(y) : std::round(y));
-    if (!pixels.valid_at(u, v) || !pixels.valid_at(u + step.dcol, v + step.drow)) return;
+    if (!image.valid_at(u, v) || !image.valid_at(u + step.dcol, v + step.drow)) return;
     moved.x = static_cast<float>(x);
     moved.y = static_cast<float>(y);
-    moved.before = v * pixels.cols + u;
-    moved.after = (v + step.drow) * pixels.cols + u + step.dcol;
+    moved.before = v * image.cols + u;
+    moved.after = (v + step.drow) * image.cols + u + step.dcol;
 }
 
 // The angle between the two surfaces that meet at c, in degrees; negative where its neighbours do not fix it.
@@ -174,38 +210,32 @@ double normal_angle(const Grid& grid, const Candidate& c, bool projective) {
 
 }  // namespace
 
-void pool(std::vector<Candidate>& candidates, const Pixels& pixels, bool projective, const Parameters& parameters) {
+template <class T>
+void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const Parameters& parameters) {
     const auto least = static_cast<float>(parameters.min_significance);
     if (!(least > 0) && !parameters.normals) return;
-    std::vector<Candidate> kept(candidates);
-    const int count = static_cast<int>(candidates.size());
-    {
-        const Grid grid(candidates, pixels.rows, pixels.cols);
-        parallel_for(count, parameters.threads, [&](int begin, int end, int) {
-            for (int i = begin; i < end; ++i) {
-                Candidate& c = kept[static_cast<std::size_t>(i)];
-                c.significance = joint_significance(grid, candidates[static_cast<std::size_t>(i)]);
-            }
+    // Each step sees all candidates as the step before left them.
+    const auto update = [&](auto&& step) {
+        const Grid grid(candidates, image.rows, image.cols);
+        grid.for_each(parameters.threads, [&](const Candidate& c, std::size_t i) { step(grid, c, candidates[i]); });
+    };
+    update([](const Grid& grid, const Candidate& c, Candidate& joined) {
+        joined.significance = joint_significance(grid, c);
+    });
+    const auto weak = [&](const Candidate& c) { return c.significance < least; };
+    candidates.erase(std::remove_if(candidates.begin(), candidates.end(), weak), candidates.end());
+    for (int round = 0; round < align_rounds; ++round)
+        update([&](const Grid& grid, const Candidate& c, Candidate& moved) {
+            align(grid, c, image, parameters.max_shift, moved);
         });
-    }
-    kept.erase(std::remove_if(kept.begin(), kept.end(), [&](const Candidate& c) { return c.significance < least; }), kept.end());
-    candidates = kept;
-    for (int round = 0; round < align_rounds; ++round) {
-        const Grid grid(kept, pixels.rows, pixels.cols);
-        parallel_for(static_cast<int>(kept.size()), parameters.threads, [&](int begin, int end, int) {
-            for (int i = begin; i < end; ++i) align(grid, kept[static_cast<std::size_t>(i)], pixels, parameters.max_shift, candidates[static_cast<std::size_t>(i)]);
-        });
-        kept = candidates;
-    }
     if (!parameters.normals) return;
-    const Grid grid(kept, pixels.rows, pixels.cols);
-    parallel_for(static_cast<int>(kept.size()), parameters.threads, [&](int begin, int end, int) {
-        for (int i = begin; i < end; ++i) {
-            Candidate& c = candidates[static_cast<std::size_t>(i)];
-            const double angle = c.crease > 0 ? normal_angle(grid, kept[static_cast<std::size_t>(i)], projective) : -1;
-            if (angle >= 0) c.crease = static_cast<float>(angle);
-        }
+    update([&](const Grid& grid, const Candidate& c, Candidate& measured) {
+        const double angle = c.crease > 0 ? normal_angle(grid, c, image.projective) : -1;
+        if (angle >= 0) measured.crease = static_cast<float>(angle);
     });
 }
+
+template void pool(std::vector<Candidate>&, const RangeImage<float>&, const Parameters&);
+template void pool(std::vector<Candidate>&, const RangeImage<double>&, const Parameters&);
 
 }  // namespace rangeedge

@@ -26,17 +26,32 @@ struct Run {
 template <class T>
 void split_run(const Run<T>& run, T eps, std::vector<Segment>& pending, std::vector<Segment>& segments);
 
+// The first sample at or after k, and before n, that is valid or is not; else n. NaN marks a sample without data.
+template <bool valid, class T>
+int find(const T* y, int k, int n) {
+    constexpr int block = 16;
+    const auto found = [y](int i) { return (y[i] == y[i]) == valid; };
+    const auto found_in_block = [&](int first) {
+        int any = 0;
+        for (int i = first; i < first + block; ++i) any |= static_cast<int>(found(i));
+        return any != 0;
+    };
+    while (k + block <= n && !found_in_block(k)) k += block;
+    while (k < n && !found(k)) ++k;
+    return k;
+}
+
 // Calls visit(first, last) for every maximal stretch of valid samples, cut where the abscissa does not increase.
 template <class T, class Visit>
 void for_each_run(const T* y, const T* x, int n, Visit&& visit) {
-    for (int k = 0; k < n;) {
-        if (!(y[k] == y[k])) {  // NaN marks a sample without data
-            ++k;
-            continue;
+    for (int k = find<true>(y, 0, n); k < n; k = find<true>(y, k, n)) {
+        const int end = find<false>(y, k, n);
+        while (k < end) {
+            const int first = k++;
+            if (!x) k = end;
+            while (k < end && x[k] > x[k - 1]) ++k;
+            visit(first, k - 1);
         }
-        const int first = k++;
-        while (k < n && y[k] == y[k] && (!x || x[k] > x[k - 1])) ++k;
-        visit(first, k - 1);
     }
 }
 
