@@ -20,7 +20,7 @@ _TRIM = 0.75  # share of the differences, the small ones, that the estimate rest
 _TRIMMED_NORMAL = 0.607  # deviation of a normal variable within its central 75 %
 _QUANTISED = 0.05  # share of differences other than zero that tells steps from edges
 _LEAST_MOVED = 0.05  # quantile of these that stands for one step
-_FINEST = 1e-5  # of the distance, or of the range of heights: no range sensor resolves more
+_FINEST = 3e-5  # of the distance, or of the range of heights: no range sensor resolves more
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def estimateNoise(
     Returns
     -------
     retval : NoiseModel
-        In the unit of the image. Never below 1e-5 of the distance (of the range of heights on a grid), so that
+        In the unit of the image. Never below 3e-5 of the distance (of the range of heights on a grid), so that
         the rounding of noise-free images counts as noise.
 
     Raises
