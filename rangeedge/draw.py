@@ -358,7 +358,7 @@ def _relief(depth: np.ndarray) -> np.ndarray:
 
 def _shade(depth: np.ndarray, valid: np.ndarray) -> np.ndarray:
     """Light that a surface of this depth reflects, in [0.25, 1]; steepness relative to the image's own slopes."""
-    smooth = cv2.GaussianBlur(depth, (0, 0), 1.5)
+    smooth = cv2.GaussianBlur(depth.astype(np.float32), (0, 0), 1.5)
     dx, dy = cv2.Scharr(smooth, cv2.CV_32F, 1, 0), cv2.Scharr(smooth, cv2.CV_32F, 0, 1)
     slope = np.hypot(dx, dy)
     typical = 2 * np.percentile(slope[valid], 75) or 1.0

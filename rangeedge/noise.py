@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ._args import error, number
+from ._args import described, error, fail, number
 from .geometry import RangeFrame, range_frame
 
 _LAG = 6  # samples: noise of neighbours this far apart counts as independent
@@ -21,7 +21,7 @@ _TRIM = 0.75  # share of the differences, the small ones, that the estimate rest
 _TRIMMED_NORMAL = 0.607  # deviation of a normal variable within its central 75 %
 _QUANTISED = 0.05  # share of differences other than zero that tells steps from edges
 _LEAST_MOVED = 0.05  # quantile of these that stands for one step
-_FINEST = 1e-5  # of the distance, or of the range of heights: no range sensor resolves more
+_FINEST = 3e-5  # of the distance, or of the range of heights: no range sensor resolves more
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def estimateNoise(
     Returns
     -------
     retval : NoiseModel
-        In the unit of the image. Never below 1e-5 of the distance (of the range of heights on a grid), so that
+        In the unit of the image. Never below 3e-5 of the distance (of the range of heights on a grid), so that
         the rounding of noise-free images counts as noise.
 
     Raises
@@ -230,7 +230,7 @@ def kernel_noise(func: str, noise: Any, frame: RangeFrame) -> tuple[tuple[float,
         return (noise.a, noise.b, noise.c, noise.correlation), None
     expected = f"a number, a NoiseModel, or a real array of shape {frame.shape}, > 0 at valid pixels"
     if noise.shape != frame.shape or noise.dtype.kind not in "iuf":
-        raise error(func, f"`noise` must be {expected}, got {noise.dtype} array of shape {noise.shape}", cv2.Error.StsBadSize)
+        raise fail(func, "noise", expected, described(noise), cv2.Error.StsBadSize)
     sigmas = np.ascontiguousarray(noise, dtype=np.float32)
     if not np.all((sigmas > 0) & np.isfinite(sigmas), where=frame.valid > 0):
         raise error(func, f"`noise` must be {expected}", cv2.Error.StsOutOfRange)

@@ -183,6 +183,7 @@ def test_stub_names_what_the_compiled_module_has():
         assert built(compiled) == {tuple(arguments(node))}, name
 
 
+@pytest.mark.skipif(np.lib.NumpyVersion(np.__version__) < "2.0.0", reason="examples print scalars as NumPy 2 does")
 @pytest.mark.parametrize("example", list(examples()))
 def test_examples_of_the_documentation(example):
     names = {name: getattr(rangeedge, name) for name in rangeedge.__all__}

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double flat = 1.25;            // rms in standard deviations up to which a plane is one
 constexpr double curved_gain = 0.8;      // a quadratic must lower the rms to this share
-constexpr double roof_gain = 0.94;       // two planes must lower the rms of the quadratic to this share
+constexpr double roof_gain = 0.97;          // two planes must lower the rms of the quadratic to this share
 constexpr int roof_rounds = 8;
 constexpr double rounding = 2.5;        // pixels on either side of a ridge
 constexpr double correlation_max = 4.0;  // noise over a region, in units of that between pixels
