@@ -102,9 +102,9 @@ def _lengths(func: str, src: np.ndarray, depthFactor: float) -> np.ndarray:
         return np.ascontiguousarray(src, dtype=np.float64 if src.dtype.itemsize > 4 else np.float32)
     if src.dtype.kind == "b":
         raise fail(func, "src", SRC + " of numbers", described(src), cv2.Error.StsUnsupportedFormat)
-    lengths = np.ascontiguousarray(src).astype(np.float32 if src.dtype.itemsize <= 2 else np.float64)
-    lengths[lengths <= 0] = np.nan
-    lengths /= lengths.dtype.type(depthFactor)
+    real = np.float32 if src.dtype.itemsize <= 2 else np.float64
+    lengths = np.divide(src, real(depthFactor), dtype=real, order="C")
+    lengths[src <= 0] = np.nan
     return lengths
 
 
@@ -112,7 +112,7 @@ def _pinhole(depth: np.ndarray, K: np.ndarray) -> RangeFrame:
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         inverse = 1 / depth
         # The inverse of 0, of a negative, of a denormal or of a non-finite depth is none of a point's.
-        inverse[~((inverse > 0) & (depth < np.inf) & (inverse < np.inf))] = np.nan
+        inverse[~((inverse > 0) & (inverse < np.inf))] = np.nan
     return RangeFrame(inverse, True, tuple(np.linalg.inv(K)[:2].ravel().tolist()))
 
 
