@@ -128,6 +128,10 @@ class TestHandCases:
         closed = closeContours(edges, depth, noise=0.1)
         assert parts(closed, np.isfinite(depth)) == 2
 
+    def test_nothing_to_dilate_ends_at_once(self):
+        edges = np.zeros((60, 60), np.uint8)
+        assert not closeContours(edges, noisy(roof()), noise=0.1, maxGap=2**31 - 1).any()
+
     def test_no_data_at_all(self):
         closed = closeContours(np.zeros((8, 9), np.uint8), np.full((8, 9), np.nan), noise=0.1)
         assert not closed.any()
