@@ -353,7 +353,7 @@ def strength_of(func: str, frame: RangeFrame, params: ScanLineParams) -> EdgeStr
     )
     noise = kernel_noise(func, params.noise, frame)
     _core.edge_strength(*frame.kernel_args, *noise, _kernel_parameters(params, frame), *strength)
-    strength.kind[frame.boundary > 0] |= EDGE_BOUNDARY
+    np.bitwise_or(strength.kind, frame.boundary * np.uint8(EDGE_BOUNDARY), out=strength.kind)
     return strength
 
 

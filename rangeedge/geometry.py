@@ -9,7 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ._args import array, boolean, described, fail, image8, number
+from ._args import array, boolean, camera_matrix, described, fail, image8, number, pixel_size
 
 SRC = "a depth image of shape (H, W), or points of shape (H, W, 3) or (H, W, 4)"
 
@@ -84,9 +84,10 @@ def range_frame(
     if src.ndim == 3:
         frame = _points(func, src, K, pixelSize, heightMap)
     elif K is not None:
-        frame = _pinhole(_lengths(func, src, depthFactor), camera_matrix(func, K))
+        frame = _pinhole(_lengths(func, src, depthFactor), camera_matrix(func, "K", K))
     else:
-        frame = _grid(_lengths(func, src, depthFactor), _spacing(func, pixelSize), heightMap)
+        spacing = (1.0, 1.0) if pixelSize is None else pixel_size(func, "pixelSize", pixelSize)
+        frame = _grid(_lengths(func, src, depthFactor), spacing, heightMap)
     if mask is None:
         return frame
     outside = image8(func, "mask", mask, frame.shape) == 0
@@ -95,43 +96,15 @@ def range_frame(
     return RangeFrame(samples, frame.projective, frame.to_plane, frame.axis)
 
 
-def camera_matrix(func: str, K: Any) -> np.ndarray:
-    """A pinhole camera's matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] in float64."""
-    expected = "a 3x3 camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with finite entries and fx, fy > 0"
-    try:
-        matrix = np.asarray(K, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise fail(func, "K", expected, described(K)) from None
-    if matrix.shape != (3, 3):
-        raise fail(func, "K", expected, f"shape {matrix.shape}", cv2.Error.StsBadSize)
-    if not np.isfinite(matrix).all() or matrix[0, 0] <= 0 or matrix[1, 1] <= 0 or matrix[1, 0] != 0:
-        raise fail(func, "K", expected, matrix.tolist())
-    if not np.array_equal(matrix[2], (0, 0, 1)):
-        raise fail(func, "K", expected, matrix.tolist())
-    return matrix
-
-
-def _spacing(func: str, pixelSize: Any) -> tuple[float, float]:
-    if pixelSize is None:
-        return 1.0, 1.0
-    if np.ndim(pixelSize) == 0:
-        h = number(func, "pixelSize", pixelSize, 0, above=True)
-        return h, h
-    if len(pixelSize) != 2:
-        raise fail(func, "pixelSize", "a length or a pair (dx, dy)", described(pixelSize))
-    dx, dy = (number(func, "pixelSize", h, 0, above=True) for h in pixelSize)
-    return dx, dy
-
-
 def _lengths(func: str, src: np.ndarray, depthFactor: float) -> np.ndarray:
     """Values as float lengths, invalid integers as NaN; float32 and float64 arrays are passed on unchanged."""
     if src.dtype.kind == "f":
         return np.ascontiguousarray(src, dtype=np.float64 if src.dtype.itemsize > 4 else np.float32)
     if src.dtype.kind == "b":
         raise fail(func, "src", SRC + " of numbers", described(src), cv2.Error.StsUnsupportedFormat)
-    lengths = np.ascontiguousarray(src).astype(np.float32 if src.dtype.itemsize <= 2 else np.float64)
-    lengths[lengths <= 0] = np.nan
-    lengths /= lengths.dtype.type(depthFactor)
+    real = np.float32 if src.dtype.itemsize <= 2 else np.float64
+    lengths = np.divide(src, real(depthFactor), dtype=real, order="C")
+    lengths[src <= 0] = np.nan
     return lengths
 
 
@@ -139,7 +112,7 @@ def _pinhole(depth: np.ndarray, K: np.ndarray) -> RangeFrame:
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         inverse = 1 / depth
         # The inverse of 0, of a negative, of a denormal or of a non-finite depth is none of a point's.
-        inverse[~((inverse > 0) & (depth < np.inf) & (inverse < np.inf))] = np.nan
+        inverse[~((inverse > 0) & (inverse < np.inf))] = np.nan
     return RangeFrame(inverse, True, tuple(np.linalg.inv(K)[:2].ravel().tolist()))
 
 

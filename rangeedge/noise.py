@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import cv2
@@ -20,7 +21,7 @@ _TRIM = 0.75  # share of the differences, the small ones, that the estimate rest
 _TRIMMED_NORMAL = 0.607  # deviation of a normal variable within its central 75 %
 _QUANTISED = 0.05  # share of differences other than zero that tells steps from edges
 _LEAST_MOVED = 0.05  # quantile of these that stands for one step
-_FINEST = 1e-5  # of the distance, or of the range of heights: no range sensor resolves more
+_FINEST = 3e-5  # of the distance, or of the range of heights: no range sensor resolves more
 
 
 @dataclass(frozen=True)
@@ -113,7 +114,7 @@ def estimateNoise(
     Returns
     -------
     retval : NoiseModel
-        In the unit of the image. Never below 1e-5 of the distance (of the range of heights on a grid), so that
+        In the unit of the image. Never below 3e-5 of the distance (of the range of heights on a grid), so that
         the rounding of noise-free images counts as noise.
 
     Raises
@@ -151,17 +152,17 @@ def noise_of(frame: RangeFrame) -> NoiseModel:
 
 
 def _third_differences(ordinate: np.ndarray, lag: int) -> tuple[np.ndarray, np.ndarray]:
-    """|y0 - 3 y1 + 3 y2 - y3| / sqrt(20) along rows and columns, and the means; windows with invalid pixels left out.
+    """|y0 - 3 y1 + 3 y2 - y3| along rows and columns, and the means; windows with invalid pixels left out.
 
     The mean of a window is independent of its difference, so that bins of it do not select among the differences.
     Of a large image every so many lines are enough.
     """
-    found, where = [np.empty(0)], [np.empty(0)]
+    found, where = [np.empty(0, ordinate.dtype)], [np.empty(0, ordinate.dtype)]
     for y in (ordinate, ordinate.T):
         if len(y) > 3 * lag:
-            y = y[:, :: 1 + y.size // _WINDOWS]
+            y = np.ascontiguousarray(y[:, :: 1 + y.size // _WINDOWS])
             outer, inner = (y[: -3 * lag], y[3 * lag :]), (y[lag : -2 * lag], y[2 * lag : -lag])
-            d = np.abs(outer[1] - outer[0] - 3 * (inner[1] - inner[0])) / np.sqrt(20)
+            d = np.abs(outer[1] - outer[0] - 3 * (inner[1] - inner[0]))
             inside = np.isfinite(d)
             found.append(d[inside])
             where.append((outer[0] + inner[0] + inner[1] + outer[1])[inside] / 4)
@@ -169,18 +170,19 @@ def _third_differences(ordinate: np.ndarray, lag: int) -> tuple[np.ndarray, np.n
 
 
 def _trimmed_deviation(differences: np.ndarray) -> float:
+    """Deviation of the noise behind third differences, of which few lie across edges."""
     kept = int(_TRIM * len(differences))
     if kept == 0:
         return 0.0
-    small = np.partition(differences, kept - 1)[:kept]
-    sigma = float(np.sqrt(np.mean(np.square(small, dtype=np.float64)))) / _TRIMMED_NORMAL
+    ordered = np.sort(differences)
+    sigma = float(np.sqrt(np.mean(np.square(ordered[:kept], dtype=np.float64)) / 20)) / _TRIMMED_NORMAL
     # Where values are coarsely quantised most differences are zero and the others multiples of the step; the least of
     # these, unless they are so few that they are edges, bounds the deviation by that of rounding.
-    moved = differences[differences > 0]
+    moved = ordered[np.searchsorted(ordered, 0, side="right") :]
     least = int(_LEAST_MOVED * len(moved))
     if len(moved) < _QUANTISED * len(differences) or least >= len(moved):
         return sigma
-    return max(sigma, float(np.partition(moved, least)[least]) * np.sqrt(20 / 12))
+    return max(sigma, float(moved[least]) / np.sqrt(12))
 
 
 def _extent(ordinates: np.ndarray) -> float:
@@ -191,14 +193,19 @@ def _extent(ordinates: np.ndarray) -> float:
 def _deviation_by_depth(differences: np.ndarray, inverse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Depths and the deviation of length there, for bins of equally many differences of inverse depth."""
     bins = max(1, min(_DEPTH_BINS, len(inverse) // _BIN_SIZE))
-    borders = np.quantile(inverse, np.arange(1, bins) / bins)
-    which = np.searchsorted(borders, inverse)
+    order = np.argsort(inverse)
+    differences, inverse = differences[order], inverse[order].astype(np.float64)
+    at = np.arange(1, bins) / bins * (len(inverse) - 1)
+    below = at.astype(int)
+    borders = inverse[below] + (at - below) * (inverse[below + 1] - inverse[below])
+    cuts = np.searchsorted(inverse, borders, side="right")
     depths, sigmas = [], []
-    for k in np.unique(which):
-        inside = which == k
-        z = 1 / float(np.median(inverse[inside]))
+    for start, end in pairwise((0, *cuts.tolist(), len(inverse))):
+        if start == end:
+            continue
+        z = 1 / float(inverse[(start + end - 1) // 2] + inverse[(start + end) // 2]) * 2
         depths.append(z)
-        sigmas.append(max(_trimmed_deviation(differences[inside]) * z * z, _FINEST * z))
+        sigmas.append(max(_trimmed_deviation(differences[start:end]) * z * z, _FINEST * z))
     return np.array(depths), np.array(sigmas)
 
 

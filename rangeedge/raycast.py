@@ -23,7 +23,6 @@ from ._constants import (
     EDGE_OCCLUDED,
     EDGE_OCCLUDING,
 )
-from .geometry import camera_matrix
 from .scanners import (
     ABW_ASPECT,
     ABW_CALIBRATIONS,
@@ -100,7 +99,7 @@ def pinholeCamera(K: np.ndarray, size: tuple[int, int], distance: float = 1.0) -
     """
     size = _size("pinholeCamera", size)
     distance = _args.number("pinholeCamera", "distance", distance, 0, above=True)
-    K = camera_matrix("pinholeCamera", K).copy()
+    K = _args.camera_matrix("pinholeCamera", "K", K).copy()
     inverse = np.linalg.inv(K)
 
     def rays(x: np.ndarray, y: np.ndarray) -> Rays:

@@ -489,7 +489,8 @@ class Detector:
             jump = 0.0
         crease = math.degrees(abs(bend)) if crease_significance >= least else 0.0
         kind = 0
-        if jump > 0 and abs(yf - yg) > JUMP_TOLERANCES * max(line.tolerance[before], line.tolerance[after]):
+        error = JUMP_TOLERANCES * max(line.tolerance[before], line.tolerance[after])
+        if jump > 0 and abs(yf - yg) > error and jump_significance >= self.p.minSignificance:
             kind |= EDGE_JUMP | (EDGE_OCCLUDING if yf > yg else EDGE_OCCLUDED)
         if crease > 0:
             kind |= EDGE_CONVEX if bend > 0 else EDGE_CONCAVE

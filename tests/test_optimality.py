@@ -217,7 +217,6 @@ def test_statistics_by_hand():
 # The detector
 
 
-@pytest.mark.xfail(strict=False, reason="a sliver of a segment between two cuts beside the edge lowers the strength")
 def test_detector_measures_a_roof_across_the_rows():
     one, two = np.array([normal(0.8, 0)] * 6), np.array([normal(-0.3, 0)] * 6)
     np.testing.assert_allclose(measureDetector(one, two), 0, atol=0.01)
@@ -230,7 +229,6 @@ def test_detector_without_noise_errs_as_the_theory_says():
     assert np.median(np.abs(measured - estimationError(one, two))) < 0.01
 
 
-@pytest.mark.xfail(strict=False, reason="edgeStrength does not combine normals yet")
 def test_detector_with_normals_is_exact_without_noise():
     errors = measureDetector(random_normals(60, 9), random_normals(60, 10), crease=CREASE_NORMAL)
     assert np.median(np.abs(errors)) < 0.1

@@ -78,38 +78,74 @@ public:
         }
     }
 
+    // Joins segments; they form a linked list meanwhile, of which the first one stays.
+    void join() {
+        const int count = static_cast<int>(r_.segments.size());
+        r_.previous.resize(r_.segments.size());
+        r_.next.resize(r_.segments.size());
+        for (int i = 0; i < count; ++i) previous(i) = i - 1, next(i) = i + 1 < count ? i + 1 : none;
+        if (count > 1) merge();
+        if (count > 2) dissolve();
+        std::size_t kept = 0;
+        for (int i = count > 0 ? 0 : none; i != none; i = next(i), ++kept) {
+            r_.segments[kept] = segment(i);
+            r_.curves[kept] = curve(i);
+        }
+        r_.segments.resize(kept);
+        r_.curves.resize(kept);
+    }
+
+private:
+    static constexpr int none = -1;
+    int& previous(int i) { return r_.previous[static_cast<std::size_t>(i)]; }
+    int& next(int i) { return r_.next[static_cast<std::size_t>(i)]; }
+    Segment& segment(int i) { return r_.segments[static_cast<std::size_t>(i)]; }
+    Curve& curve(int i) { return r_.curves[static_cast<std::size_t>(i)]; }
+    Moments& moments(int i) { return r_.moments[static_cast<std::size_t>(i)]; }
+    double& cost(int i) { return r_.costs[static_cast<std::size_t>(i)]; }
+
+    void remove(int i) {
+        next(previous(i)) = next(i);
+        if (next(i) != none) previous(next(i)) = previous(i);
+    }
+
     // Takes back cuts, the least significant first, until each one left lowers the sum of squares enough.
     void merge() {
-        const double limit = parameters_.merge_significance * parameters_.merge_significance;
-        if (r_.segments.size() < 2) return;
-        r_.costs.resize(r_.segments.size() - 1);
-        for (std::size_t i = 0; i < r_.costs.size(); ++i) r_.costs[i] = cost_of_merging(i);
-        while (!r_.costs.empty()) {
-            const auto least = std::min_element(r_.costs.begin(), r_.costs.end());
-            if (!(*least < limit)) break;
-            const auto i = static_cast<std::size_t>(least - r_.costs.begin());
-            r_.moments[i] = joined(r_.moments[i], r_.moments[i + 1]);
-            r_.segments[i].last = r_.segments[i + 1].last;
-            r_.curves[i] = fit_least_squares(r_.moments[i], sigma(r_.segments[i]), curved_significance);
-            erase(i + 1);
-            r_.costs.erase(least);
-            if (i < r_.costs.size()) r_.costs[i] = cost_of_merging(i);
-            if (i > 0) r_.costs[i - 1] = cost_of_merging(i - 1);
+        r_.costs.resize(r_.segments.size());
+        for (int i = 0; i != none; i = next(i)) price(i);
+        while (!r_.cheap.empty()) {
+            const Join join = r_.cheap.front();
+            std::pop_heap(r_.cheap.begin(), r_.cheap.end());
+            r_.cheap.pop_back();
+            const int i = join.left, right = next(i);
+            if (cost(i) != join.cost) continue;  // it has changed since
+            moments(i) = joined(moments(i), moments(right));
+            segment(i).last = segment(right).last;
+            curve(i) = fit_least_squares(moments(i), sigma(segment(i)), curved_significance);
+            cost(right) = HUGE_VAL;
+            remove(right);
+            price(i);
+            if (previous(i) != none) price(previous(i));
         }
+    }
+
+    void price(int i) {
+        const double limit = parameters_.merge_significance * parameters_.merge_significance;
+        cost(i) = cost_of_merging(i);
+        if (!(cost(i) < limit)) return;
+        r_.cheap.push_back({cost(i), i});
+        std::push_heap(r_.cheap.begin(), r_.cheap.end());
     }
 
     // Splitting may leave a segment across an edge, its rounding included, where one cut would do. It is taken out
     // where the curves beside it meet within it and, given its samples, explain them nearly as well.
     void dissolve() {
-        for (std::size_t i = 1; i + 1 < r_.segments.size();) {
-            if (dissolved(i))
-                i = std::max<std::size_t>(1, i - 1);
-            else
-                ++i;
+        for (int i = next(0); i != none && next(i) != none;) {
+            const int before = previous(i), after = next(i);
+            i = !dissolved(i) || previous(before) == none ? after : before;
         }
     }
 
-private:
     Moments empty_moments(int k) const {
         Moments moments;
         moments.origin = line_.abscissa(k);
@@ -134,34 +170,28 @@ private:
 
     double sigma(const Segment& s) const { return line_.sigma_at(s.first + s.size() / 2); }
 
-    void erase(std::size_t i) {
-        const auto at = static_cast<std::ptrdiff_t>(i);
-        r_.segments.erase(r_.segments.begin() + at);
-        r_.curves.erase(r_.curves.begin() + at);
-        r_.moments.erase(r_.moments.begin() + at);
+    bool adjacent(int i) {
+        const int last = segment(i).last;
+        return last + 1 == segment(next(i)).first && line_.abscissa(last) < line_.abscissa(last + 1);
     }
 
-    bool adjacent(std::size_t i) const {
-        const int last = r_.segments[i].last;
-        return last + 1 == r_.segments[i + 1].first && line_.abscissa(last) < line_.abscissa(last + 1);
+    double cost_of_merging(int i) {
+        if (next(i) == none || !adjacent(i)) return HUGE_VAL;
+        const double s = line_.sigma_at(segment(i).last);
+        const Curve one = fit_least_squares(joined(moments(i), moments(next(i))), s, curved_significance);
+        return (one.sum_squares - curve(i).sum_squares - curve(next(i)).sum_squares) / (s * s);
     }
 
-    double cost_of_merging(std::size_t i) const {
-        if (!adjacent(i)) return HUGE_VAL;
-        const double s = line_.sigma_at(r_.segments[i].last);
-        const Curve one = fit_least_squares(joined(r_.moments[i], r_.moments[i + 1]), s, curved_significance);
-        return (one.sum_squares - r_.curves[i].sum_squares - r_.curves[i + 1].sum_squares) / (s * s);
-    }
-
-    bool dissolved(std::size_t i) {
-        if (!adjacent(i - 1) || !adjacent(i)) return false;
-        const Segment s = r_.segments[i];
-        const Curve &f = r_.curves[i - 1], &g = r_.curves[i + 1];
+    bool dissolved(int i) {
+        const int before = previous(i), after = next(i);
+        if (!adjacent(before) || !adjacent(i)) return false;
+        const Segment s = segment(i);
+        const Curve &f = curve(before), &g = curve(after);
         double x = 0;
         if (!intersection(f, g, (line_.abscissa(s.first) + line_.abscissa(s.last)) / 2, x)) return false;
         if (x < line_.abscissa(s.first - 1) || x > line_.abscissa(s.last + 1)) return false;
         int cut = s.first - 1;
-        Moments left = r_.moments[i - 1], right = r_.moments[i + 1];
+        Moments left = moments(before), right = moments(after);
         for (int k = s.first; k <= s.last; ++k) {
             if (line_.abscissa(k) <= x) cut = k;
             add(k == cut ? left : right, k);
@@ -169,14 +199,14 @@ private:
         const double v = sigma(s);
         const Curve to_cut = fit_least_squares(left, v, curved_significance);
         const Curve from_cut = fit_least_squares(right, v, curved_significance);
-        const double before = f.sum_squares + r_.curves[i].sum_squares + g.sum_squares;
+        const double sum = f.sum_squares + curve(i).sum_squares + g.sum_squares;
         const double limit = straddling * parameters_.merge_significance * v;
-        if (!(to_cut.sum_squares + from_cut.sum_squares - before < limit * limit)) return false;
-        r_.segments[i - 1].last = cut;
-        r_.segments[i + 1].first = cut + 1;
-        r_.moments[i - 1] = left, r_.moments[i + 1] = right;
-        r_.curves[i - 1] = to_cut, r_.curves[i + 1] = from_cut;
-        erase(i);
+        if (!(to_cut.sum_squares + from_cut.sum_squares - sum < limit * limit)) return false;
+        segment(before).last = cut;
+        segment(after).first = cut + 1;
+        moments(before) = left, moments(after) = right;
+        curve(before) = to_cut, curve(after) = from_cut;
+        remove(i);
         return true;
     }
 
@@ -207,9 +237,7 @@ void approximate(const Line<T>& line, const Parameters& parameters, Approximatio
         return;
     }
     approximator.fit();
-    if (!(parameters.merge_significance > 0)) return;
-    approximator.merge();
-    approximator.dissolve();
+    if (parameters.merge_significance > 0) approximator.join();
 }
 
 template void approximate(const Line<float>&, const Parameters&, Approximation&);

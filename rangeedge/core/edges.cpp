@@ -103,8 +103,9 @@ private:
         c.crease = static_cast<float>(crease);
         const double significance = jump > 0 ? std::max(jump_significance, crease_significance) : crease_significance;
         c.significance = std::min(static_cast<float>(significance), endless);
+        // A jump exceeds the error of the approximation, and is significant without its neighbours.
         const double error = jump_tolerances * std::max(line.tolerance_at(cut.before), line.tolerance_at(cut.after));
-        if (jump > 0 && std::abs(yf - yg) > error)
+        if (jump > 0 && std::abs(yf - yg) > error && jump_significance >= parameters_.min_significance)
             c.kind |= static_cast<std::uint8_t>(jump_bit | (yf > yg ? occluding_bit : occluded_bit));
         if (crease > 0) c.kind |= cross > 0 ? convex_bit : concave_bit;  // the tangent turns away from the viewer
         c.direction = static_cast<std::uint8_t>(direction_);

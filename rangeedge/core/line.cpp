@@ -71,7 +71,7 @@ void LineReader<T>::read(int direction, int first, std::vector<Line<T>>& lines) 
 // A strip of some rows after the other, and in it line by line.
 template <class T>
 void LineReader<T>::gather(std::vector<Line<T>>& lines) const {
-    constexpr int strip = 16;
+    constexpr int strip = 16, ahead = 2 * strip;
     for (int top = 0; top < image_.rows; top += strip)
         for (Line<T>& line : lines) {
             const Path& path = line.path;
@@ -85,7 +85,10 @@ void LineReader<T>::gather(std::vector<Line<T>>& lines) const {
             }
             const T* source = image_.ordinate + path.pixel(0, image_.cols);
             T* y = line.y.data();
-            for (int k = first; k < last; ++k) y[k] = source[k * stride];
+            for (int k = first; k < last; ++k) {
+                if (path.drow != 0) __builtin_prefetch(source + (k + ahead) * stride);
+                y[k] = source[k * stride];
+            }
         }
 }
 

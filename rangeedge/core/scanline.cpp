@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scanline.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <type_traits>
 
@@ -50,18 +51,21 @@ Worst<T> worst_of(const Run<T>& run, const ThreePoint<T>& curve, int first, int 
     return worst;
 }
 
-// The same for samples one unit apart, eight at a time: each lane keeps its own worst.
+// The same for eight or more samples one unit apart, eight at a time: each lane keeps its own worst. The last eight
+// overlap those before them, which changes nothing.
 RANGEEDGE_WIDE
-Worst<float> worst_of_lanes(const float* y, const float* scale, const ThreePoint<float>& curve, int first, int blocks) {
+Worst<float> worst_of_lanes(const float* y, const float* scale, const ThreePoint<float>& curve, int first, int last) {
     const Int8 count{0, 1, 2, 3, 4, 5, 6, 7};
-    Int8 index = count + first, at = index;
-    Float8 t = __builtin_convertvector(index, Float8) - curve.origin;
+    Int8 at = count + first;
     Float8 worst = {-1, -1, -1, -1, -1, -1, -1, -1};
-    for (int k = first; k < first + 8 * blocks; k += 8) {
+    for (int next = first; next < last; next += 8) {
+        const int k = std::min(next, last - 8);
+        const Int8 index = count + k;
+        const Float8 t = __builtin_convertvector(index, Float8) - curve.origin;
         Float8 value, factor;
         std::memcpy(&value, y + k, sizeof value);
         Float8 r = value - (curve.ym + t * (curve.b + curve.a * t));
-        r = r < 0 ? -r : r;
+        r = reinterpret_cast<Float8>(reinterpret_cast<Int8>(r) & 0x7fffffff);
         if (scale) {
             std::memcpy(&factor, scale + k, sizeof factor);
             r *= factor;
@@ -69,8 +73,6 @@ Worst<float> worst_of_lanes(const float* y, const float* scale, const ThreePoint
         const Int8 larger = r > worst;
         worst = larger ? r : worst;
         at = larger ? index : at;
-        t += 8;
-        index += 8;
     }
     Worst<float> result{worst[0], at[0]};
     for (int i = 1; i < 8; ++i)
@@ -82,14 +84,8 @@ template <class T>
 Worst<T> worst_sample(const Run<T>& run, const Segment& s) {
     const ThreePoint<T> curve(run, s);
     const int first = s.first + 1;
-    if constexpr (std::is_same_v<T, float>) {
-        const int blocks = (s.last - first) / 8;
-        if (!run.x && blocks > 0) {
-            const Worst<T> most = worst_of_lanes(run.y, run.scale, curve, first, blocks);
-            const Worst<T> rest = worst_of(run, curve, first + 8 * blocks, s.last);
-            return rest.residual > most.residual ? rest : most;
-        }
-    }
+    if constexpr (std::is_same_v<T, float>)
+        if (!run.x && s.last - first >= 8) return worst_of_lanes(run.y, run.scale, curve, first, s.last);
     return worst_of(run, curve, first, s.last);
 }
 

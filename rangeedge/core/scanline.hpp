@@ -1,6 +1,7 @@
 // Scan line approximation (paper, section 4.1): one scan line, a curve in a plane, is split into segments.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstring>
 #include <vector>
 
 namespace rangeedge {
@@ -29,15 +30,22 @@ void split_run(const Run<T>& run, T eps, std::vector<Segment>& pending, std::vec
 // The first sample at or after k, and before n, that is valid or is not; else n. NaN marks a sample without data.
 template <bool valid, class T>
 int find(const T* y, int k, int n) {
-    constexpr int block = 16;
-    const auto found = [y](int i) { return (y[i] == y[i]) == valid; };
-    const auto found_in_block = [&](int first) {
-        int any = 0;
-        for (int i = first; i < first + block; ++i) any |= static_cast<int>(found(i));
-        return any != 0;
+    typedef T Lanes __attribute__((vector_size(16)));
+    constexpr int count = 4 * sizeof(Lanes) / sizeof(T);
+    const auto found_in_lanes = [y](int first) {
+        Lanes lanes[4];
+        std::memcpy(lanes, y + first, sizeof lanes);
+        auto invalid = lanes[0] != lanes[0];
+        for (int i = 1; i < 4; ++i) {
+            const auto also = lanes[i] != lanes[i];
+            invalid = valid ? invalid & also : invalid | also;
+        }
+        long long halves[2];
+        std::memcpy(halves, &invalid, sizeof halves);
+        return valid ? (halves[0] & halves[1]) != -1 : (halves[0] | halves[1]) != 0;
     };
-    while (k + block <= n && !found_in_block(k)) k += block;
-    while (k < n && !found(k)) ++k;
+    while (k + count <= n && !found_in_lanes(k)) k += count;
+    while (k < n && (y[k] == y[k]) != valid) ++k;
     return k;
 }
 
