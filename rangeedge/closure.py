@@ -4,16 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import cv2
 import numpy as np
 
 from . import _core
 from ._args import deliver, image8, integer, number
 from .geometry import RangeFrame, range_frame
 from .noise import kernel_noise
-
-_CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
-_SQUARE = cv2.getStructuringElement(cv2.MORPH_RECT, (3, 3))
 
 
 def closeContours(
@@ -91,18 +87,25 @@ def closeContours(
     """
     func = "closeContours"
     frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    edges = image8(func, "edges", edges, frame.shape) != 0
+    edges = image8(func, "edges", edges, frame.shape)
     tolerance = number(func, "tolerance", tolerance, 0, above=True)
     share = number(func, "share", share, 0, 1, above=True)
     maxGap = integer(func, "maxGap", maxGap, 0)
     minArea = integer(func, "minArea", minArea, 1)
     coefficients, noise_map = kernel_noise(func, noise, frame)
-    test = dict(
-        surface_map(frame, coefficients, noise_map), correlation=coefficients[3], tolerance=tolerance, share=share
+    arguments = surface_map(frame, coefficients, noise_map)
+    arguments["edges"] = edges
+    regions = np.empty(frame.shape, np.int32)
+    _core.verified_regions(
+        **arguments,
+        correlation=coefficients[3],
+        tolerance=tolerance,
+        share=share,
+        dilations=(maxGap + 1) // 2,
+        min_area=minArea,
+        regions=regions,
     )
-    inside = frame.valid.astype(bool) & ~edges
-    regions = _grown_back(_verified(inside, test, (maxGap + 1) // 2, minArea), inside)
-    closed = (edges | _meetings(regions)).view(np.uint8) * np.uint8(255)
+    closed = ((edges != 0) | _meetings(regions)).view(np.uint8) * np.uint8(255)
     return deliver(func, "dst", closed, dst)
 
 
@@ -144,44 +147,6 @@ def _places(frame: RangeFrame) -> tuple[np.ndarray | None, np.ndarray | None, tu
     spacing = float(np.median(steps)) if len(steps) else 1.0
     to_plane = (spacing, 0.0, 0.0, 0.0, spacing, 0.0)
     return (x / spacing).astype(np.float32), (y / spacing).astype(np.float32), to_plane
-
-
-def _verified(inside: np.ndarray, test: dict[str, Any], dilations: int, minArea: int) -> np.ndarray:
-    """Labels of the verified parts of `inside`, which shrink until they are."""
-    regions = np.zeros(inside.shape, np.int32)
-    pending, found = inside.view(np.uint8), 0
-    for step in range(dilations + 1):
-        _, labels, stats, _ = cv2.connectedComponentsWithStats(pending, connectivity=4, ltype=cv2.CV_32S)
-        large = stats[:, cv2.CC_STAT_AREA] >= minArea
-        large[0] = False
-        if not large.any():
-            break
-        number_of = np.cumsum(large, dtype=np.int32) * large
-        labels = number_of[labels]
-        accepted = np.zeros(number_of.max() + 1, np.uint8)
-        _core.verify_surfaces(labels=labels, accepted=accepted, **test)
-        new = np.cumsum(accepted, dtype=np.int32) * accepted
-        here = new[labels]
-        regions += np.where(here > 0, here + np.int32(found), np.int32(0))
-        found += int(new.max())
-        pending = ((labels > 0) & (accepted[labels] == 0)).view(np.uint8)
-        # Cross and square in turn: an octagon.
-        pending = cv2.erode(pending, _SQUARE if step % 2 else _CROSS, borderType=cv2.BORDER_CONSTANT, borderValue=1)
-    return regions
-
-
-def _grown_back(regions: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """Regions grown over the rest of `inside`, a pixel at a time."""
-    labels = regions.astype(np.float32)  # exact up to 2^24 regions; cv2 dilates no integers of 32 bits
-    free = inside & (regions == 0)
-    while free.any():
-        around = cv2.dilate(labels, _CROSS, borderType=cv2.BORDER_CONSTANT, borderValue=0)
-        reached = free & (around > 0)
-        if not reached.any():
-            break
-        labels[reached] = around[reached]
-        free &= ~reached
-    return labels
 
 
 def _meetings(regions: np.ndarray) -> np.ndarray:

@@ -41,14 +41,12 @@ int grow_regions(const Optional& x, const Optional& y, const Map<const float>& o
     return rangeedge::grow_regions(map, markers.data(), parameters, labels.data());
 }
 
-void verify_surfaces(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
-                     bool projective, const std::array<double, 6>& to_plane, const std::array<double, 3>& noise,
-                     const Optional& noise_map, const Map<const std::uint8_t>& edges,
-                     const Map<const std::int32_t>& labels, double correlation, double tolerance, double share,
-                     const nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>& accepted) {
+void verified_regions(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
+                      bool projective, const std::array<double, 6>& to_plane, const std::array<double, 3>& noise,
+                      const Optional& noise_map, const Map<const std::uint8_t>& edges, double correlation,
+                      double tolerance, double share, int dilations, int min_area, const Map<std::int32_t>& regions) {
     const auto map = range_map(x, y, ordinate, offset, projective, to_plane, noise, noise_map, edges);
-    rangeedge::verify_surfaces(map, labels.data(), static_cast<int>(accepted.shape(0)) - 1, correlation, tolerance,
-                               share, accepted.data());
+    rangeedge::verified_regions(map, {correlation, tolerance, share, dilations, min_area}, regions.data());
 }
 
 }  // namespace
@@ -69,8 +67,8 @@ void bind_regions(nb::module_& m) {
           "offset"_a, "projective"_a, "to_plane"_a, "noise"_a, "noise_map"_a.noconvert().none(),
           "edges"_a.noconvert().none(), "markers"_a.noconvert(), "parameters"_a, "labels"_a.noconvert(),
           nb::call_guard<nb::gil_scoped_release>());
-    m.def("verify_surfaces", &verify_surfaces, "x"_a.noconvert().none(), "y"_a.noconvert().none(),
+    m.def("verified_regions", &verified_regions, "x"_a.noconvert().none(), "y"_a.noconvert().none(),
           "ordinate"_a.noconvert(), "offset"_a, "projective"_a, "to_plane"_a, "noise"_a,
-          "noise_map"_a.noconvert().none(), "edges"_a.noconvert().none(), "labels"_a.noconvert(), "correlation"_a,
-          "tolerance"_a, "share"_a, "accepted"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
+          "noise_map"_a.noconvert().none(), "edges"_a.noconvert().none(), "correlation"_a, "tolerance"_a, "share"_a,
+          "dilations"_a, "min_area"_a, "regions"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
 }

@@ -1,4 +1,4 @@
-// Region hypotheses verified by a surface (Jiang, PAMI 22(11) 2000).
+// Contour closure: edges dilated until what they enclose is a surface (Jiang, PAMI 22(11) 2000).
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
@@ -8,10 +8,15 @@
 
 namespace rangeedge {
 
-// For each label 1..count of `labels`, writes to accepted[label] whether a plane, or a quadratic that two planes do not
-// beat, leaves at most 1 - `share` of its pixels farther off than `tolerance` standard deviations, each `correlation`
-// times that between pixels. accepted[0] is 0.
-void verify_surfaces(const RangeMap& map, const std::int32_t* labels, int count, double correlation, double tolerance,
-                     double share, std::uint8_t* accepted);
+struct ClosureParameters {
+    double correlation;  // standard deviation of a pixel from its surface, in units of that between pixels
+    double tolerance;    // of a pixel on its surface, in these standard deviations
+    double share;        // of the pixels of a surface that lie on it
+    int dilations;       // at most, by a pixel each
+    int min_area;        // of a component, in pixels
+};
+
+// Labels 1, 2, ... of the parts of what is no edge that are surfaces, grown back over the rest of it; 0 elsewhere.
+void verified_regions(const RangeMap& map, const ClosureParameters& parameters, std::int32_t* regions);
 
 }  // namespace rangeedge

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "seeds.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
+#include <cstdlib>
 #include <cstring>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -12,70 +15,119 @@ namespace {
 
 using Index = std::int32_t;
 
-constexpr int digit_bits = 11;
+// A pixel by falling distance, equal ones by rising index: the bits of floats >= 0 are ordered as their values are.
+struct Place {
+    std::uint32_t fall;
+    Index pixel;
+};
 
-std::uint32_t bits_of(float value) {
+Place place_of(float distance, Index pixel) {
     std::uint32_t bits;
-    std::memcpy(&bits, &value, sizeof bits);
-    return bits;
+    std::memcpy(&bits, &distance, sizeof bits);
+    return {~bits, pixel};
 }
 
-// Indices by falling value, equal ones by rising index. The bits of floats >= 0 are ordered as their values are.
-void sort_falling(const float* value, std::vector<Index>& order) {
-    std::vector<Index> other(order.size());
-    for (int shift = 0; shift < 32; shift += digit_bits) {
-        constexpr std::uint32_t digits = 1u << digit_bits;
-        std::array<std::size_t, digits + 1> start{};
-        const auto digit = [&](Index p) { return digits - 1 - ((bits_of(value[p]) >> shift) & (digits - 1)); };
-        for (const Index p : order) ++start[digit(p) + 1];
-        for (std::size_t d = 1; d <= digits; ++d) start[d] += start[d - 1];
-        for (const Index p : order) other[start[digit(p)]++] = p;
-        order.swap(other);
+// By rising `fall`; equal ones stay in order.
+void sort(std::vector<Place>& places) {
+    constexpr int bits = 11, passes = 3;
+    constexpr std::uint32_t digits = 1u << bits;
+    const auto digit = [](const Place& place, int pass) { return (place.fall >> (pass * bits)) & (digits - 1); };
+    std::vector<std::array<std::size_t, digits>> start(passes);
+    for (const Place& place : places)
+        for (int pass = 0; pass < passes; ++pass) ++start[static_cast<std::size_t>(pass)][digit(place, pass)];
+    std::vector<Place> other(places.size());
+    for (int pass = 0; pass < passes; ++pass) {
+        auto& next = start[static_cast<std::size_t>(pass)];
+        std::size_t sum = 0;
+        for (std::size_t& n : next) sum += std::exchange(n, sum);
+        for (const Place& place : places) other[next[digit(place, pass)]++] = place;
+        places.swap(other);
     }
 }
 
-// Sinking water: components of what lies above the level, each known by its highest pixel.
+// Of which of the eight neighbours one of each connected group is the first, by which of them there are.
+std::array<std::uint8_t, 256> first_of_groups() {
+    constexpr int x[8] = {-1, 0, 1, -1, 1, -1, 0, 1}, y[8] = {-1, -1, -1, 0, 0, 1, 1, 1};
+    std::array<std::uint8_t, 256> first{};
+    for (unsigned there = 0; there < 256; ++there)
+        for (unsigned rest = there; rest;) {
+            unsigned group = rest & (0u - rest);
+            first[there] = static_cast<std::uint8_t>(first[there] | group);
+            for (unsigned before = 0; before != group;) {
+                before = group;
+                for (int i = 0; i < 8; ++i)
+                    for (int j = 0; j < 8; ++j)
+                        if ((before >> i & 1) && (rest >> j & 1) && std::abs(x[i] - x[j]) <= 1 &&
+                            std::abs(y[i] - y[j]) <= 1)
+                            group |= 1u << j;
+            }
+            rest &= ~group;
+        }
+    return first;
+}
+
+// Sinking water: islands are the components of what lies above the level, each known by its peak.
 class Islands {
 public:
-    // Pixels have an index in an image with a margin; `neighbours` are the steps to the eight around.
-    Islands(const std::vector<float>& distance, const std::array<Index, 8>& neighbours, float separation)
-        : distance_(distance), neighbours_(neighbours), separation_(separation), parent_(distance.size(), -1) {}
+    Islands(const std::vector<float>& distance, float separation) : distance_(distance), separation_(separation) {}
 
-    // Peaks by themselves of the pixels in `order`, which fall in distance.
-    std::vector<Index> peaks(const std::vector<Index>& order) {
-        std::vector<Index> found;
-        for (const Index p : order) {
-            parent(p) = p;
-            for (const Index step : neighbours_)
-                if (parent(p + step) >= 0) join(p, p + step, found);
-        }
-        for (const Index p : order)
-            if (parent(p) == p) found.push_back(p);
-        return found;
-    }
+    // Peaks by themselves of the pixels in `order`, which fall in distance. Pixels have an index in an image with a
+    // margin; `neighbours` are the steps to the eight around, in raster order.
+    std::vector<Index> peaks(const std::vector<Place>& order, const std::array<Index, 8>& neighbours);
 
 private:
-    float at(Index p) const { return distance_[static_cast<std::size_t>(p)]; }
-    Index& parent(Index p) { return parent_[static_cast<std::size_t>(p)]; }
+    struct Island {
+        Index peak;
+        std::size_t home;  // the island that has taken this one in, or itself
+    };
 
-    Index root(Index p) {
-        while (parent(p) != p) p = parent(p) = parent(parent(p));
-        return p;
+    std::size_t home(std::size_t i) {
+        while (island_[i].home != i) i = island_[i].home = island_[island_[i].home].home;
+        return i;
     }
-
-    void join(Index level, Index q, std::vector<Index>& found) {
-        Index low = root(level), high = root(q);
-        if (low == high) return;
-        if (at(low) > at(high) || (at(low) == at(high) && low < high)) std::swap(low, high);
-        if (at(level) < separation_ * at(low)) found.push_back(low);
-        parent(low) = high;
-    }
+    float top(std::size_t i) const { return distance_[static_cast<std::size_t>(island_[i].peak)]; }
+    std::size_t join(std::size_t low, std::size_t high, float level);
 
     const std::vector<float>& distance_;
-    std::array<Index, 8> neighbours_;
     float separation_;
-    std::vector<Index> parent_;
+    std::vector<Island> island_;
+    std::vector<Index> found_;
 };
+
+// The higher island, or that of lower index, takes in the other, and keeps its number.
+std::size_t Islands::join(std::size_t low, std::size_t high, float level) {
+    if (low == high) return high;
+    const Index a = island_[low].peak, b = island_[high].peak;
+    if (top(low) > top(high) || (top(low) == top(high) && a < b)) std::swap(low, high);
+    if (level < separation_ * top(low)) found_.push_back(island_[low].peak);
+    island_[low].home = high;
+    return high;
+}
+
+std::vector<Index> Islands::peaks(const std::vector<Place>& order, const std::array<Index, 8>& neighbours) {
+    const std::array<std::uint8_t, 256> first = first_of_groups();
+    const std::array<Index, 8> steps = neighbours;
+    std::vector<std::uint8_t> above(distance_.size(), 0);  // which neighbours are
+    std::vector<std::uint32_t> number(distance_.size());   // of a pixel's island
+    for (const Place& place : order) {
+        const auto p = static_cast<std::size_t>(place.pixel);
+        // Neighbours that touch each other are on one island.
+        const unsigned groups = first[above[p]];
+        std::size_t own = island_.size();
+        if (!groups) island_.push_back({place.pixel, own});
+        for (std::size_t i = 0; groups >> i; ++i)
+            if (groups >> i & 1) {
+                const std::size_t other = home(number[static_cast<std::size_t>(place.pixel + steps[i])]);
+                own = own == island_.size() ? other : join(own, other, distance_[p]);
+            }
+        number[p] = static_cast<std::uint32_t>(own);
+        for (std::size_t i = 0; i < 8; ++i)
+            above[static_cast<std::size_t>(place.pixel + steps[i])] |= static_cast<std::uint8_t>(128u >> i);
+    }
+    for (std::size_t i = 0; i < island_.size(); ++i)
+        if (island_[i].home == i) found_.push_back(island_[i].peak);
+    return std::move(found_);
+}
 
 }  // namespace
 
@@ -85,42 +137,45 @@ int extract_seeds(const float* distance, const std::uint8_t* mask, int height, i
     const std::array<Index, 8> neighbours{-stride - 1, -stride, -stride + 1, -1, 1, stride - 1, stride, stride + 1};
     const float lowest = separation * min_distance;
     std::vector<float> inside(static_cast<std::size_t>(stride) * static_cast<std::size_t>(height + 2), 0);
-    std::vector<Index> order;
+    std::vector<Place> order;
+    order.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
     for (int row = 0; row < height; ++row)
         for (int col = 0; col < width; ++col) {
             const Index k = row * width + col, p = (row + 1) * stride + col + 1;
             if (!(distance[k] > 0) || distance[k] < lowest || (mask && !mask[k])) continue;
             inside[static_cast<std::size_t>(p)] = distance[k];
-            order.push_back(p);
+            order.push_back(place_of(distance[k], p));
         }
-    sort_falling(inside.data(), order);
+    sort(order);
 
     // Flood every seed from its peak.
     std::vector<Index> seed(inside.size(), 0), stack;
-    for (const Index peak : Islands(inside, neighbours, separation).peaks(order)) {
+    Index seeds = 0;
+    for (const Index peak : Islands(inside, separation).peaks(order, neighbours)) {
         const float top = inside[static_cast<std::size_t>(peak)];
         if (top < min_distance) continue;
-        seed[static_cast<std::size_t>(peak)] = peak;
+        const float least = std::max(separation * top, std::numeric_limits<float>::denorm_min());
+        seed[static_cast<std::size_t>(peak)] = ++seeds;
         stack.assign(1, peak);
         while (!stack.empty()) {
             const Index p = stack.back();
             stack.pop_back();
             for (const Index step : neighbours) {
                 const auto q = static_cast<std::size_t>(p + step);
-                if (seed[q] || !(inside[q] > 0) || inside[q] < separation * top) continue;
-                seed[q] = peak;
+                if (inside[q] < least || seed[q]) continue;
+                seed[q] = seeds;
                 stack.push_back(p + step);
             }
         }
     }
     // Number them.
-    std::vector<Index> number(inside.size(), 0);
+    std::vector<Index> number(static_cast<std::size_t>(seeds) + 1, 0);
     Index count = 0;
     for (int row = 0; row < height; ++row)
         for (int col = 0; col < width; ++col) {
-            const Index peak = seed[static_cast<std::size_t>((row + 1) * stride + col + 1)];
-            Index& n = number[static_cast<std::size_t>(peak)];
-            if (peak && !n) n = ++count;
+            const Index own = seed[static_cast<std::size_t>((row + 1) * stride + col + 1)];
+            Index& n = number[static_cast<std::size_t>(own)];
+            if (own && !n) n = ++count;
             markers[row * width + col] = n;
         }
     return count;

@@ -1,0 +1,102 @@
+// 4-connected components of an image, as runs of pixels in rows.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+namespace rangeedge {
+
+// Components of equal values other than 0, in raster order of first pixels. Images have a margin of one pixel, all 0,
+// and pixels are known by their index there.
+class Components {
+public:
+    struct Run {
+        int begin, end;  // pixels [begin, end)
+    };
+    struct Range {
+        const Run *first, *last;
+        const Run* begin() const { return first; }
+        const Run* end() const { return last; }
+    };
+
+    template <class T>
+    Components(const T* image, int rows, int cols) {
+        const int stride = cols + 2;
+        std::vector<Run> found;
+        std::vector<int> parent;  // of runs; roots are first in raster order
+        const auto root = [&](std::size_t i) {
+            int r = static_cast<int>(i);
+            while (parent[static_cast<std::size_t>(r)] != r) {
+                int& up = parent[static_cast<std::size_t>(r)];
+                r = up = parent[static_cast<std::size_t>(up)];
+            }
+            return r;
+        };
+        std::size_t above = 0;  // first run that may touch the next one from the row above
+        for (int row = 0; row < rows; ++row) {
+            const std::size_t row_begin = found.size();
+            int p = (row + 1) * stride + 1;
+            for (const int end = p + cols; p < end;) {
+                const T value = image[p];
+                if (!value) {
+                    ++p;
+                    continue;
+                }
+                const Run run{p, [&] {
+                                  while (image[p] == value) ++p;
+                                  return p;
+                              }()};
+                const std::size_t i = found.size();
+                found.push_back(run);
+                parent.push_back(static_cast<int>(i));
+                while (above < row_begin && found[above].end + stride <= run.begin) ++above;
+                for (std::size_t k = above; k < row_begin && found[k].begin + stride < run.end; ++k) {
+                    if (image[found[k].begin] != value) continue;
+                    const auto [low, high] = std::minmax({root(k), root(i)});
+                    parent[static_cast<std::size_t>(high)] = low;
+                }
+            }
+            above = row_begin;
+        }
+        sort(found, parent);
+    }
+
+    int count() const { return static_cast<int>(areas_.size()); }
+    int area(int i) const { return areas_[static_cast<std::size_t>(i)]; }
+    // Its runs in raster order.
+    Range runs(int i) const {
+        const auto k = static_cast<std::size_t>(i);
+        return {runs_.data() + starts_[k], runs_.data() + starts_[k + 1]};
+    }
+
+private:
+    void sort(const std::vector<Run>& found, std::vector<int>& parent) {
+        std::vector<std::size_t> sizes;
+        for (std::size_t i = 0; i < found.size(); ++i) {
+            int& own = parent[i];  // becomes the component of the run
+            if (own == static_cast<int>(i)) {
+                own = count();
+                areas_.push_back(0);
+                sizes.push_back(0);
+            } else {
+                own = parent[static_cast<std::size_t>(own)];
+            }
+            areas_[static_cast<std::size_t>(own)] += found[i].end - found[i].begin;
+            ++sizes[static_cast<std::size_t>(own)];
+        }
+        starts_.assign(1, 0);
+        for (const std::size_t size : sizes) starts_.push_back(starts_.back() + size);
+        runs_.resize(found.size());
+        auto next = starts_;
+        for (std::size_t i = 0; i < found.size(); ++i) runs_[next[static_cast<std::size_t>(parent[i])]++] = found[i];
+    }
+
+    std::vector<Run> runs_;            // by component
+    std::vector<std::size_t> starts_;  // of components in runs_
+    std::vector<int> areas_;
+};
+
+}  // namespace rangeedge
