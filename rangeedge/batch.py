@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 
 import cv2
 
-from ._args import boolean, error, integer
+from ._args import boolean, described, error, fail, integer
 from .io import RangeImage, imreadRange
-from .results import EdgeResults, edge_files, find_edges, plain, write_folder
+from .results import EdgeResults, detection, edge_files, find_edges, plain, write_folder
 
 
 class BatchItem(NamedTuple):
@@ -38,7 +38,8 @@ def detectBatch(
     detectBatch(paths, out, *[, jobs[, force[, ...]]]) -> items
 
     The results of ``a/frame1.png`` go to ``out/frame1/``. An image that cannot be processed does not stop the others.
-    A folder is complete or not there; so a batch that was interrupted goes on where it stopped when it is run again.
+    A folder without its report, which is written last, is not done; so a batch that was interrupted goes on where it
+    stopped when it is run again.
 
     Parameters
     ----------
@@ -61,7 +62,7 @@ def detectBatch(
     Raises
     ------
     rangeedge.error
-        If two images would be written to the same folder, or `jobs` or `force` is no such thing.
+        If two images would be written to the same folder, or an argument is bad, as far as that shows without an image.
 
     Examples
     --------
@@ -69,13 +70,18 @@ def detectBatch(
     >>> [item.state for item in detectBatch(["missing.png"], tempfile.mkdtemp())]
     ['failed']
     """
-    jobs = integer("detectBatch", "jobs", jobs, 1)
-    force = boolean("detectBatch", "force", force)
+    func = "detectBatch"
+    if isinstance(paths, (str, bytes, os.PathLike)):
+        raise fail(func, "paths", "an iterable of file names", described(paths))
+    jobs = integer(func, "jobs", jobs, 1)
+    force = boolean(func, "force", force)
+    detection(func, {name: value for name, value in options.items() if name not in ("mask", "calibration")})
     folders: dict[Path, str] = {}
     for path in map(os.fspath, paths):
-        other = folders.setdefault(Path(out) / Path(path).stem, path)
-        if other != path:
-            raise error("detectBatch", f"{other!r} and {path!r} would be written to the same folder")
+        folder = Path(out) / Path(path).stem
+        if folder in folders:
+            raise error(func, f"{folders[folder]!r} and {path!r} would be written to the same folder")
+        folders[folder] = path
     return _results([(path, folder) for folder, path in folders.items()], jobs, force, options)
 
 

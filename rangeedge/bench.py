@@ -12,20 +12,20 @@ import numpy as np
 
 from . import __version__
 from ._args import integer
-from .detector import detectEdges
+from .detector import Selection, detectEdges, selected_of
 from .distance import distanceTransform, salienceDistanceTransform
 from .edges import edgePoints, edgeStrength
 from .geometry import range_frame
 from .noise import estimateNoise
 from .seeds import extractSeeds
-from .selection import overallStrength, selectEdges
+from .selection import overallStrength
 from .thinning import thinEdges
 
 
 def benchmark(src: np.ndarray, *, repeat: int = 20, mask: np.ndarray | None = None, **geometry: Any) -> dict[str, Any]:
     """Time the stages in turn, again and again, in one process.
 
-    benchmark(src[, repeat[, mask[, K[, pixelSize[, heightMap[, depthFactor]]]]]]) -> retval
+    benchmark(src, *[, repeat[, mask[, K[, pixelSize[, heightMap[, depthFactor]]]]]]) -> retval
 
     Parameters
     ----------
@@ -71,16 +71,17 @@ def stages(src: np.ndarray, mask: np.ndarray | None, geometry: dict[str, Any]) -
     depth = range_frame("benchmark", src, mask=mask, **geometry).depth
     grey = cv2.normalize(np.nan_to_num(depth), None, 0, 255, cv2.NORM_MINMAX, cv2.CV_8U)
     noise = estimateNoise(src, mask=mask, **geometry)
-    jump, crease, _, _ = edgeStrength(src, noise=noise, mask=mask, **geometry)
-    selected = selectEdges(jump, crease, 0.0, minLength=6)
+    strength = edgeStrength(src, noise=noise, mask=mask, **geometry)
+    selection = Selection().checked("benchmark")
+    selected = selected_of(strength, selection)
     thin = thinEdges(selected)
-    salience = overallStrength(jump, crease, max(float(jump.max()), 1e-6))
+    salience = overallStrength(strength.jump, strength.crease, max(float(strength.jump.max()), 1e-6))
     distance = distanceTransform(thin)
     return {
         "detectEdges": lambda: detectEdges(src, mask=mask, **geometry),
         "  estimateNoise": lambda: estimateNoise(src, mask=mask, **geometry),
         "  edgeStrength, noise given": lambda: edgeStrength(src, noise=noise, mask=mask, **geometry),
-        "  selectEdges": lambda: selectEdges(jump, crease, 0.0, minLength=6),
+        "  selection": lambda: selected_of(strength, selection),
         "  thinEdges": lambda: thinEdges(selected),
         "edgePoints, noise given": lambda: edgePoints(src, noise=noise, mask=mask, **geometry),
         "distanceTransform": lambda: distanceTransform(thin),

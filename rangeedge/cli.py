@@ -32,16 +32,13 @@ from ._constants import (
     MEASURE_MIDPOINT,
 )
 from .batch import detect_file, detectBatch, read_image
-from .detector import detectEdges
+from .detector import Selection
 from .edges import ScanLineParams
 from .noise import NoiseModel
-from .regions import growRegions, segmentRegions
+from .regions import Growing, growRegions
 from .results import (
     EDGE_FILES,
-    GEOMETRY,
-    GROWING,
     REGION_FILES,
-    SEEDING,
     EdgeResults,
     edge_files,
     find_edges,
@@ -74,6 +71,7 @@ Run it again after an interruption, and it does what is missing.""",
   rangeedge bench depth.png -K 525,525,319.5,239.5 --json""",
 }
 
+_GEOMETRY = ("K", "pixelSize", "heightMap", "depthFactor")
 _DIRECTIONS = {"rows": DIR_ROWS, "cols": DIR_COLS, "diag45": DIR_DIAG45, "diag135": DIR_DIAG135, "all": DIR_ALL}
 _CHOICES = {
     "fit": {"lsq": FIT_LSQ, "interp": FIT_INTERP},
@@ -134,7 +132,9 @@ def _parser() -> argparse.ArgumentParser:
     _add_detector(demo)
 
     bench = _command(commands, "bench", _bench, "measure how long each stage takes on this machine")
-    bench.add_argument("image", metavar="IMAGE", nargs="?", help="as for `detect`; default: the scene of `demo`")
+    bench.add_argument(
+        "image", metavar="IMAGE", nargs="?", default=None, help="as for `detect`; default: the scene of `demo`"
+    )
     bench.add_argument("--repeat", type=int, default=20, metavar="N", help="runs of each stage (default: 20)")
     bench.add_argument("--json", action="store_true", default=False, help="print JSON instead of a table")
     _add_geometry(bench)
@@ -192,7 +192,7 @@ def _add_geometry(parser: argparse.ArgumentParser) -> None:
 
 def _add_detector(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("which edges are kept")
-    defaults = {name: p.default for name, p in inspect.signature(detectEdges).parameters.items()}
+    defaults = Selection()._asdict()
     for name, kind, text in (
         ("jumpThreshold", float, "least jump, a length (default: any beyond the noise)"),
         ("creaseThreshold", float, "least crease, in degrees (default: %(was)s)"),
@@ -207,16 +207,16 @@ def _add_detector(parser: argparse.ArgumentParser) -> None:
         _add_option(group, name, kind, text.replace("%(was)s", str(defaults[name])))
     group = parser.add_argument_group("how edges are found (the fields of ScanLineParams)")
     for field in fields(ScanLineParams):
-        if field.name not in GEOMETRY:
+        if field.name not in _GEOMETRY:
             _add_field(group, field.name)
 
 
 def _add_growing(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("how regions grow")
     texts = {**_documented(extractSeeds), **_documented(growRegions)}
-    for name in GROWING:
-        default = inspect.signature(segmentRegions).parameters[name].default
-        text = f"{'Seeds: ' if name in SEEDING else ''}{texts.get(name, '')} (default: {default:g})"
+    seeding = inspect.signature(extractSeeds).parameters
+    for name, default in Growing()._asdict().items():
+        text = f"{'Seeds: ' if name in seeding else ''}{texts.get(name, '')} (default: {default:g})"
         _add_option(group, name, type(default), text)
 
 
@@ -383,7 +383,11 @@ def _bench(args: argparse.Namespace) -> int:
     from .bench import benchmark, table
     from .demo import rendered_scene
 
-    image = read_image(args.image, _options(args)) if "image" in args else rendered_scene()
+    options = _options(args)
+    if args.image is None and options:
+        given = " ".join("-K" if name == "K" else "--" + _kebab(name) for name in options)
+        raise error("bench", f"{given}: of an image, but none is given; the scene of `demo` has its own")
+    image = rendered_scene() if args.image is None else read_image(args.image, options)
     times = benchmark(image.src, repeat=args.repeat, **image.geometry)
     print(json.dumps(times, indent=2) if args.json else table(times))
     return 0

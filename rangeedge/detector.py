@@ -8,7 +8,7 @@ import re
 from collections.abc import Callable
 from dataclasses import asdict, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import cv2
 import numpy as np
@@ -22,11 +22,13 @@ from ._args import (
     error,
     errors_of,
     fail,
+    integer,
     number,
     pixel_size,
     threshold,
 )
 from ._constants import EDGE_OCCLUDING
+from ._files import write_atomically
 from .edges import (
     EdgeStrength,
     ScanLineParams,
@@ -36,35 +38,63 @@ from .edges import (
     strength_of,
     takes_scan_line_params,
 )
-from .io import write_atomically
+from .geometry import RangeFrame
 from .noise import NoiseModel
-from .selection import selectEdges
+from .selection import at_least, selectEdges
 from .thinning import thinEdges
 
-CREASE_THRESHOLD = 30.0
-HYSTERESIS = 1.0
-MIN_LENGTH = 5
-
 _SUFFIXES = (".xml", ".yml", ".yaml", ".json")  # by which cv2.FileStorage knows the format
+_OPENING, _CLOSING = "savedBy", "complete"  # the first and the last key of a file that `save` has written
+
+
+class Selection(NamedTuple):
+    """Which strengths make an edge, with the defaults of `detectEdges`."""
+
+    jumpThreshold: float | None = None
+    creaseThreshold: float = 30.0
+    hysteresis: float = 1.0
+    minLength: int = 5
+    dynamic: bool = False
+
+    def checked(self, func: str) -> Selection:
+        """The same with every value of its own type; an error names `func`."""
+        return Selection(
+            0.0 if self.jumpThreshold is None else threshold(func, "jumpThreshold", self.jumpThreshold),
+            threshold(func, "creaseThreshold", self.creaseThreshold),
+            number(func, "hysteresis", self.hysteresis, 0, 1, above=True),
+            integer(func, "minLength", self.minLength, 1),
+            boolean(func, "dynamic", self.dynamic),
+        )
+
+
+_DEFAULT = Selection()
+
+
+class FoundEdges(NamedTuple):
+    """What `detectEdges` computes on the way."""
+
+    strength: EdgeStrength
+    selected: np.ndarray
+    thin: np.ndarray
 
 
 @takes_scan_line_params
 def detectEdges(
     src: np.ndarray,
     jumpThreshold: float | None = None,
-    creaseThreshold: float = CREASE_THRESHOLD,
+    creaseThreshold: float = _DEFAULT.creaseThreshold,
     eps: float | None = None,
     edges: np.ndarray | None = None,
     *,
     mask: np.ndarray | None = None,
-    hysteresis: float = HYSTERESIS,
-    minLength: int = MIN_LENGTH,
+    hysteresis: float = _DEFAULT.hysteresis,
+    minLength: int = _DEFAULT.minLength,
     dynamic: bool = False,
     **options: Any,
 ) -> np.ndarray:
     """Find the edges of a range image as a map of lines one pixel wide.
 
-    detectEdges(src[, jumpThreshold[, creaseThreshold[, eps[, edges[, mask[, ...]]]]]]) -> edges
+    detectEdges(src[, jumpThreshold[, creaseThreshold[, eps[, edges]]]], *[, mask[, hysteresis[, ...]]]) -> edges
 
     What `cv2.Canny` is to intensities, for depths: `edgeStrength`, then `selectEdges`, then `thinEdges`. A pixel is an
     edge where
@@ -72,7 +102,7 @@ def detectEdges(
         jump >= jumpThreshold on the nearer side of the jump,  or  crease >= creaseThreshold,
 
     so the line along a jump lies on the surface that occludes the other. A crease pixel counts only where three of its
-    neighbours are creases as well, lest lines fray.
+    neighbours are creases as well, lest lines fray; in an image of fewer than three rows or columns every one does.
 
     Parameters
     ----------
@@ -129,37 +159,33 @@ def detectEdges(
     """
     func = "detectEdges"
     params = params_of(func, eps, options)
-    strength = strength_of(func, frame_of(func, src, params, mask), params)
-    selected = selected_of(func, strength, jumpThreshold, creaseThreshold, hysteresis, minLength, dynamic)
-    return deliver(func, "edges", thinEdges(selected), edges)
+    selection = Selection(jumpThreshold, creaseThreshold, hysteresis, minLength, dynamic).checked(func)
+    found = found_edges(func, frame_of(func, src, params, mask), params, selection)
+    return deliver(func, "edges", found.thin, edges)
 
 
-def selected_of(
-    func: str,
-    strength: EdgeStrength,
-    jumpThreshold: float | None = None,
-    creaseThreshold: float = CREASE_THRESHOLD,
-    hysteresis: float = HYSTERESIS,
-    minLength: int = MIN_LENGTH,
-    dynamic: bool = False,
-) -> np.ndarray:
-    """The edge map of `func` before thinning: jumps on their nearer side, and creases."""
+def found_edges(func: str, frame: RangeFrame, params: ScanLineParams, selection: Selection) -> FoundEdges:
+    """The edges of a checked range image, by checked parameters."""
+    strength = strength_of(func, frame, params)
+    selected = selected_of(strength, selection)
+    return FoundEdges(strength, selected, thinEdges(selected))
+
+
+def selected_of(strength: EdgeStrength, selection: Selection) -> np.ndarray:
+    """The edge map before thinning: jumps on their nearer side, and creases that do not stand alone."""
     jump = np.where(strength.kind & EDGE_OCCLUDING, strength.jump, np.float32(0))
-    least = 0.0 if jumpThreshold is None else jumpThreshold
-    with errors_of(func):
-        creaseThreshold = threshold(func, "creaseThreshold", creaseThreshold)
-        low = creaseThreshold * number(func, "hysteresis", hysteresis, 0, 1, above=True)
-        crease = _unfrayed(strength.crease, low)
-        return selectEdges(
-            jump, crease, least, creaseThreshold, hysteresis=hysteresis, minLength=minLength, dynamic=dynamic
-        )
+    crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold)
+    return selectEdges(jump, crease, **selection._asdict())
 
 
 def _unfrayed(crease: np.ndarray, least: float) -> np.ndarray:
-    """Creases without stray pixels: of the nine around one that stays, four are at least as strong as `least`."""
+    """Creases without stray pixels: of the nine around one that stays, four reach `least`.
+
+    In an image of one or two rows or columns lines cannot have so many neighbours: all its creases stay.
+    """
     if min(crease.shape) < 3:
         return crease
-    strong = (crease >= least).view(np.uint8)
+    strong = at_least(crease, least).view(np.uint8)
     around = cv2.boxFilter(strong, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
     return np.where(around >= 4, crease, np.float32(0))
 
@@ -286,22 +312,22 @@ class ScanLineDetector:
         self,
         src: np.ndarray,
         jumpThreshold: float | None = None,
-        creaseThreshold: float = CREASE_THRESHOLD,
+        creaseThreshold: float = _DEFAULT.creaseThreshold,
         edges: np.ndarray | None = None,
         *,
         mask: np.ndarray | None = None,
-        hysteresis: float = HYSTERESIS,
-        minLength: int = MIN_LENGTH,
+        hysteresis: float = _DEFAULT.hysteresis,
+        minLength: int = _DEFAULT.minLength,
         dynamic: bool = False,
     ) -> np.ndarray:
         """Find the edges as a map of lines one pixel wide, as the function `detectEdges` does.
 
-        detectEdges(src[, jumpThreshold[, creaseThreshold[, edges[, mask[, ...]]]]]) -> edges
+        detectEdges(src[, jumpThreshold[, creaseThreshold[, edges]]], *[, mask[, hysteresis[, ...]]]) -> edges
         """
         params, func = self._params, "ScanLineDetector.detectEdges"
-        strength = strength_of(func, frame_of(func, src, params, mask), params)
-        selected = selected_of(func, strength, jumpThreshold, creaseThreshold, hysteresis, minLength, dynamic)
-        return deliver(func, "edges", thinEdges(selected), edges)
+        selection = Selection(jumpThreshold, creaseThreshold, hysteresis, minLength, dynamic).checked(func)
+        found = found_edges(func, frame_of(func, src, params, mask), params, selection)
+        return deliver(func, "edges", found.thin, edges)
 
     def clear(self) -> None:
         """Give every parameter its default again.
@@ -369,7 +395,9 @@ class ScanLineDetector:
         if suffix not in _SUFFIXES:
             raise fail(func, "filename", f"a file name with one of the suffixes {' '.join(_SUFFIXES)}", repr(name))
         fs = cv2.FileStorage(suffix, cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
+        fs.write(_OPENING, "rangeedge")
         self.write(fs, self.getDefaultName())
+        fs.write(_CLOSING, 1)
         try:
             write_atomically(name, fs.releaseAndGetString().encode())
         except (OSError, ValueError) as reason:
@@ -381,7 +409,7 @@ class ScanLineDetector:
 
         load(filename) -> None
 
-        On any error the parameters stay as they were.
+        On any error the parameters stay as they were. A file of `save` that has lost its end is one.
         """
         func = "ScanLineDetector.load"
         name = _file_name(func, filename)
@@ -394,10 +422,13 @@ class ScanLineDetector:
         try:
             fs.open(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
             node = fs.getNode(self.getDefaultName())
+            whole = fs.getNode(_OPENING).empty() or fs.getNode(_CLOSING).real() == 1
         except cv2.error as problem:
             raise error(func, f"cannot read {name!r}: {problem.err}", cv2.Error.StsParseError) from problem
         if not node.isMap():
             raise error(func, f"{name!r} holds no `{self.getDefaultName()}`", cv2.Error.StsParseError)
+        if not whole:
+            raise error(func, f"{name!r} is not complete", cv2.Error.StsParseError)
         try:
             self.read(node)
         except error as problem:

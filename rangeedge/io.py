@@ -6,7 +6,6 @@ import io
 import os
 import re
 import struct
-import uuid
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +15,7 @@ import cv2
 import numpy as np
 
 from . import _args, pointcloud
+from ._files import write_atomically
 from .geometry import range_frame
 from .scanners import SCANNER_SIZE, abwPoints, perceptronPoints
 
@@ -183,18 +183,6 @@ def imwriteRange(
         what = getattr(reason, "strerror", None) or reason
         raise _args.error("imwriteRange", f"cannot write {name!r}: {what}", cv2.Error.StsError) from reason
     return True
-
-
-def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
-    """Make `data` the content of the file, in one step: readers see the old content or the new one."""
-    target = Path(path)
-    temporary = target.with_name(f".{uuid.uuid4().hex}.tmp")
-    try:
-        temporary.write_bytes(data)
-        os.replace(temporary, target)
-    except BaseException:
-        temporary.unlink(missing_ok=True)
-        raise
 
 
 def _path(func: str, path: Any) -> str:

@@ -2,19 +2,41 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from . import _core
 from ._args import boolean, image8, integer, labels32s, number
-from .closure import surface_map
-from .detector import detectEdges
+from .detector import Selection, found_edges
 from .distance import distanceTransform
+from .edges import ScanLineParams
 from .geometry import RangeFrame, range_frame
 from .noise import kernel_noise, noise_of
-from .seeds import extractSeeds, label_statistics
-from .surfaces import surfaces_of
+from .seeds import extractSeeds, label_statistics, seeding
+from .surfaces import surface_map, surfaces_of
+
+
+class Growing(NamedTuple):
+    """How seeds are found and regions grow from them, with the defaults of `segmentRegions`."""
+
+    minDistance: float = 3.0
+    separation: float = 0.65
+    tolerance: float = 3.0
+    smoothAngle: float = 8.0
+    minArea: int = 100
+
+    def checked(self, func: str) -> Growing:
+        """The same with every value of its own type; an error names `func`."""
+        return Growing(
+            *seeding(func, self.minDistance, self.separation),
+            number(func, "tolerance", self.tolerance, 0, above=True),
+            number(func, "smoothAngle", self.smoothAngle, 0, 30),
+            integer(func, "minArea", self.minArea, 1),
+        )
+
+
+_DEFAULT = Growing()
 
 
 def growRegions(
@@ -28,9 +50,9 @@ def growRegions(
     depthFactor: float = 1000.0,
     mask: np.ndarray | None = None,
     noise: Any = None,
-    tolerance: float = 3.0,
-    smoothAngle: float = 8.0,
-    minArea: int = 100,
+    tolerance: float = _DEFAULT.tolerance,
+    smoothAngle: float = _DEFAULT.smoothAngle,
+    minArea: int = _DEFAULT.minArea,
     newSeeds: bool = False,
 ) -> np.ndarray:
     """Grow regions from markers: pixels go to the surface they lie on, edges keep surfaces apart.
@@ -92,7 +114,8 @@ def growRegions(
     """
     func = "growRegions"
     frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    return _grow(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, newSeeds)
+    growing = Growing(tolerance=tolerance, smoothAngle=smoothAngle, minArea=minArea)
+    return _grow(func, frame, markers, edges, noise, growing, newSeeds)
 
 
 def growRegionsWithStats(
@@ -106,9 +129,9 @@ def growRegionsWithStats(
     depthFactor: float = 1000.0,
     mask: np.ndarray | None = None,
     noise: Any = None,
-    tolerance: float = 3.0,
-    smoothAngle: float = 8.0,
-    minArea: int = 100,
+    tolerance: float = _DEFAULT.tolerance,
+    smoothAngle: float = _DEFAULT.smoothAngle,
+    minArea: int = _DEFAULT.minArea,
     newSeeds: bool = False,
 ) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Grow regions from markers, and describe each: extent, centre and surface.
@@ -127,8 +150,8 @@ def growRegionsWithStats(
     """
     func = "growRegionsWithStats"
     frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    labels = _grow(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, newSeeds)
-    return _described(frame, labels, heightMap)
+    growing = Growing(tolerance=tolerance, smoothAngle=smoothAngle, minArea=minArea)
+    return described_regions(frame, _grow(func, frame, markers, edges, noise, growing, newSeeds), heightMap)
 
 
 def segmentRegions(
@@ -141,11 +164,11 @@ def segmentRegions(
     mask: np.ndarray | None = None,
     noise: Any = None,
     edges: np.ndarray | None = None,
-    minDistance: float = 3.0,
-    separation: float = 0.65,
-    tolerance: float = 3.0,
-    smoothAngle: float = 8.0,
-    minArea: int = 100,
+    minDistance: float = _DEFAULT.minDistance,
+    separation: float = _DEFAULT.separation,
+    tolerance: float = _DEFAULT.tolerance,
+    smoothAngle: float = _DEFAULT.smoothAngle,
+    minArea: int = _DEFAULT.minArea,
 ) -> np.ndarray:
     """Segment a range image into surfaces: one label for each face of a polyhedron, cylinder, sphere.
 
@@ -189,10 +212,8 @@ def segmentRegions(
     """
     func = "segmentRegions"
     frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    geometry = dict(K=K, pixelSize=pixelSize, heightMap=heightMap, depthFactor=depthFactor, mask=mask)
-    return _segment(
-        func, src, frame, geometry, noise, edges, (minDistance, separation), tolerance, smoothAngle, minArea
-    )
+    growing = Growing(minDistance, separation, tolerance, smoothAngle, minArea)
+    return _segment(func, frame, noise, edges, growing)
 
 
 def segmentRegionsWithStats(
@@ -205,11 +226,11 @@ def segmentRegionsWithStats(
     mask: np.ndarray | None = None,
     noise: Any = None,
     edges: np.ndarray | None = None,
-    minDistance: float = 3.0,
-    separation: float = 0.65,
-    tolerance: float = 3.0,
-    smoothAngle: float = 8.0,
-    minArea: int = 100,
+    minDistance: float = _DEFAULT.minDistance,
+    separation: float = _DEFAULT.separation,
+    tolerance: float = _DEFAULT.tolerance,
+    smoothAngle: float = _DEFAULT.smoothAngle,
+    minArea: int = _DEFAULT.minArea,
 ) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Segment a range image into surfaces, and describe each: extent, centre and surface.
 
@@ -262,32 +283,27 @@ def segmentRegionsWithStats(
     """
     func = "segmentRegionsWithStats"
     frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    geometry = dict(K=K, pixelSize=pixelSize, heightMap=heightMap, depthFactor=depthFactor, mask=mask)
-    seeds = (minDistance, separation)
-    labels = _segment(func, src, frame, geometry, noise, edges, seeds, tolerance, smoothAngle, minArea)
-    return _described(frame, labels, heightMap)
+    growing = Growing(minDistance, separation, tolerance, smoothAngle, minArea)
+    return described_regions(frame, _segment(func, frame, noise, edges, growing), heightMap)
 
 
-def _segment(
-    func: str,
-    src: np.ndarray,
-    frame: RangeFrame,
-    geometry: dict[str, Any],
-    noise: Any,
-    edges: np.ndarray | None,
-    seeds: tuple[float, float],
-    tolerance: float,
-    smoothAngle: float,
-    minArea: int,
-) -> np.ndarray:
+def _segment(func: str, frame: RangeFrame, noise: Any, edges: np.ndarray | None, growing: Growing) -> np.ndarray:
+    growing = growing.checked(func)
     noise = noise_of(frame) if noise is None else noise
-    kernel_noise(func, noise, frame)  # an error is this function's
-    edges = detectEdges(src, noise=noise, **geometry) if edges is None else image8(func, "edges", edges, frame.shape)
+    if edges is None:
+        edges = found_edges(func, frame, ScanLineParams(noise=noise), Selection().checked(func)).thin
+    else:
+        edges = image8(func, "edges", edges, frame.shape)
+    return seeded_regions(func, frame, edges, noise, growing)[1]
+
+
+def seeded_regions(
+    func: str, frame: RangeFrame, edges: np.ndarray, noise: Any, growing: Growing
+) -> tuple[np.ndarray, np.ndarray]:
+    """Seeds between the edges of a checked range image, and the regions that grow from them."""
     distance = distanceTransform((edges != 0) | (frame.valid == 0))
-    minDistance = number(func, "minDistance", seeds[0], 0, above=True)
-    separation = number(func, "separation", seeds[1], 0, np.nextafter(1, 0), above=True)
-    _, markers = extractSeeds(distance, minDistance=minDistance, separation=separation)
-    return _grow(func, frame, markers, edges, noise, tolerance, smoothAngle, minArea, True)
+    _, seeds = extractSeeds(distance, minDistance=growing.minDistance, separation=growing.separation)
+    return seeds, _grow(func, frame, seeds, edges, noise, growing, True)
 
 
 def _grow(
@@ -296,17 +312,16 @@ def _grow(
     markers: np.ndarray,
     edges: np.ndarray | None,
     noise: Any,
-    tolerance: float,
-    smoothAngle: float,
-    minArea: int,
+    growing: Growing,
     newSeeds: bool,
 ) -> np.ndarray:
     markers = labels32s(func, "markers", markers, frame.shape)
     edges = None if edges is None else image8(func, "edges", edges, frame.shape)
+    growing = growing.checked(func)
     parameters = _core.RegionParameters(
-        tolerance=number(func, "tolerance", tolerance, 0, above=True),
-        smooth_angle=number(func, "smoothAngle", smoothAngle, 0, 30),
-        min_area=integer(func, "minArea", minArea, 1),
+        tolerance=growing.tolerance,
+        smooth_angle=growing.smoothAngle,
+        min_area=growing.minArea,
         new_seeds=boolean(func, "newSeeds", newSeeds),
     )
     arguments = surface_map(frame, *kernel_noise(func, noise, frame))
@@ -316,8 +331,9 @@ def _grow(
     return labels
 
 
-def _described(
+def described_regions(
     frame: RangeFrame, labels: np.ndarray, heightMap: bool
 ) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """What `segmentRegionsWithStats` returns of labelled regions."""
     count = int(labels.max()) + 1
     return count, labels, *label_statistics(labels, count), surfaces_of(frame, labels, count, heightMap)

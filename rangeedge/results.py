@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-import inspect
 import io
 import json
+import math
 import os
 import shutil
 import uuid
 import zlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,15 +18,16 @@ import cv2
 import numpy as np
 
 from ._args import described, error
-from .detector import selected_of
+from .detector import Selection, found_edges
 from .distance import distanceTransform
 from .draw import drawOverview, region_overview
-from .edges import EdgeStrength, frame_of, params_of, points_of, strength_of
+from .edges import EdgeStrength, ScanLineParams, frame_of, params_of, points_of
 from .geometry import RangeFrame
 from .noise import noise_of
-from .regions import growRegionsWithStats, segmentRegions
-from .seeds import extractSeeds
-from .thinning import thinEdges
+from .regions import Growing, described_regions, seeded_regions
+
+_REPORT = "report.json"
+_LABELS = 65535  # that 16 bits hold
 
 REGION_FILES = {
     "overview.png": "everything in one picture",
@@ -34,13 +35,8 @@ REGION_FILES = {
     "seeds.png": "the seeds that regions grew from, in the same way (16 bits)",
     "surfaces.csv": "of every region: box, area, centroid, normal, quadric, deviation",
     "thin.png": "the edges, one pixel wide: 255, elsewhere 0",
-    "report.json": "the image, the options, and what was found, in numbers",
+    _REPORT: "the image, the options, and what was found, in numbers",
 }
-
-SELECTION = ("jumpThreshold", "creaseThreshold", "hysteresis", "minLength", "dynamic")  # keywords of detectEdges
-GEOMETRY = ("K", "pixelSize", "heightMap", "depthFactor")
-GROWING = ("minDistance", "separation", "tolerance", "smoothAngle", "minArea")  # keywords of segmentRegions
-SEEDING = {name: inspect.signature(segmentRegions).parameters[name].default for name in GROWING[:2]}
 
 EDGE_FILES = {
     "overview.png": "everything in one picture",
@@ -52,7 +48,7 @@ EDGE_FILES = {
     "significance.tiff": "strength over its standard deviation (float32)",
     "distance.tiff": "distance to the nearest thin edge, in pixels (float32)",
     "points.csv": "candidates with subpixel positions: x, y, jump, crease, kind, significance, direction",
-    "report.json": "the image, the options, and what was found, in numbers",
+    _REPORT: "the image, the options, and what was found, in numbers",
 }
 
 
@@ -78,16 +74,26 @@ class EdgeResults(NamedTuple):
 def find_edges(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> EdgeResults:
     """What `detectEdges` returns, with all that it computes on the way."""
     func = "detectEdges"
-    selection = {name: options.pop(name) for name in SELECTION if name in options}
-    params = params_of(func, options.pop("eps", None), options)
+    params, selection = detection(func, options)
     frame = frame_of(func, src, params, mask)
     if params.noise is None:
         params = dataclasses.replace(params, noise=noise_of(frame))
-    strength = strength_of(func, frame, params)
-    edges = selected_of(func, strength, **selection)
-    thin = thinEdges(edges)
+    strength, edges, thin = found_edges(func, frame, params, selection)
     points = points_of(func, frame, params)
     return EdgeResults(frame, params.noise, params.heightMap, strength, points, edges, thin, distanceTransform(thin))
+
+
+def detection(func: str, options: Mapping[str, Any]) -> tuple[ScanLineParams, Selection]:
+    """The keywords of `detectEdges` but `mask`, checked as far as that takes no image."""
+    selection, others = _split(options, Selection._fields)
+    params = params_of(func, others.pop("eps", None), others)
+    return params, Selection(**selection).checked(func)
+
+
+def _split(options: Mapping[str, Any], names: Collection[str]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The options of these names, and the others."""
+    inside = {name: value for name, value in options.items() if name in names}
+    return inside, {name: value for name, value in options.items() if name not in names}
 
 
 class RegionResults(NamedTuple):
@@ -102,15 +108,12 @@ class RegionResults(NamedTuple):
 
 def find_regions(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> RegionResults:
     """What `segmentRegionsWithStats` returns, with all that it computes on the way."""
-    growing = {name: options.pop(name) for name in GROWING if name in options}
-    seeding = {name: growing.pop(name, SEEDING[name]) for name in SEEDING}
-    found = find_edges(src, mask=mask, **options)
-    distance = distanceTransform((found.thin != 0) | (found.frame.valid == 0))
-    _, seeds = extractSeeds(distance, **seeding)
-    geometry = {name: options[name] for name in GEOMETRY if name in options}
-    _, labels, stats, _, surfaces = growRegionsWithStats(
-        src, seeds, edges=found.thin, mask=mask, noise=found.noise, newSeeds=True, **geometry, **growing
-    )
+    func = "segmentRegions"
+    growing, others = _split(options, Growing._fields)
+    growing = Growing(**growing).checked(func)
+    found = find_edges(src, mask=mask, **others)
+    seeds, labels = seeded_regions(func, found.frame, found.thin, found.noise, growing)
+    _, _, stats, _, surfaces = described_regions(found.frame, labels, found.heightMap)
     return RegionResults(found, seeds, labels, stats, surfaces)
 
 
@@ -129,15 +132,17 @@ def edge_files(found: EdgeResults, title: str, options: Mapping[str, Any]) -> di
         "significance.tiff": encoded(".tiff", found.strength.significance),
         "distance.tiff": encoded(".tiff", found.distance),
         "points.csv": _points_csv(found.points),
-        "report.json": _report(found, title, options, edgePoints=len(found.points)),
+        _REPORT: _report(found, title, options, edgePoints=len(found.points)),
     }
 
 
 def region_files(found: RegionResults, title: str, options: Mapping[str, Any]) -> dict[str, bytes]:
     """The files of REGION_FILES."""
-    edges, count = found.edges, len(found.surfaces) - 1
-    if max(count, found.seeds.max()) > 65535:
-        raise error("segment", f"labels.png has room for 65535 regions, {count} were found; raise `minArea`")
+    edges, count, seeds = found.edges, len(found.surfaces) - 1, int(found.seeds.max())
+    if count > _LABELS:
+        raise error("segment", f"labels.png has room for {_LABELS} regions, {count} were found; raise `minArea`")
+    if seeds > _LABELS:
+        raise error("segment", f"seeds.png has room for {_LABELS} seeds, {seeds} were found; raise `minDistance`")
     overview = region_overview(
         edges.surface,
         found.seeds,
@@ -153,7 +158,7 @@ def region_files(found: RegionResults, title: str, options: Mapping[str, Any]) -
         "seeds.png": encoded(".png", found.seeds.astype(np.uint16)),
         "surfaces.csv": _surfaces_csv(found.stats, found.surfaces),
         "thin.png": encoded(".png", edges.thin),
-        "report.json": _report(edges, title, options, regions=count, seeds=int(found.seeds.max())),
+        _REPORT: _report(edges, title, options, regions=count, seeds=seeds),
     }
 
 
@@ -171,18 +176,22 @@ def _report(found: EdgeResults, title: str, options: Mapping[str, Any], **more: 
         **more,
         "noise": plain(found.noise),
     }
-    return json.dumps(report, indent=2).encode() + b"\n"
+    return json.dumps(report, indent=2, allow_nan=False).encode() + b"\n"
 
 
 def plain(value: Any) -> Any:
-    """Options as JSON knows them."""
+    """Options as JSON knows them; what is no finite number as a string."""
     if isinstance(value, Mapping):
         return {key: plain(v) for key, v in value.items()}
     if dataclasses.is_dataclass(value):
-        return dataclasses.asdict(value)
-    if isinstance(value, np.ndarray):
-        return value.tolist() if value.size <= 9 else f"{described(value)}, crc32 {zlib.crc32(value.tobytes()):08x}"
-    return list(value) if isinstance(value, tuple) else value
+        return plain(dataclasses.asdict(value))
+    if isinstance(value, np.ndarray) and value.size > 9:
+        return f"{described(value)}, crc32 {zlib.crc32(value.tobytes()):08x}"
+    if isinstance(value, (np.ndarray, np.generic)):
+        return plain(value.tolist())
+    if isinstance(value, (tuple, list)):
+        return [plain(v) for v in value]
+    return str(value) if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def encoded(suffix: str, picture: np.ndarray) -> bytes:
@@ -213,9 +222,11 @@ def _surfaces_csv(stats: np.ndarray, surfaces: np.ndarray) -> bytes:
 
 
 def write_folder(out: str | os.PathLike[str], files: Mapping[str, bytes]) -> None:
-    """Write files into a folder, which is made where it is missing: all of them, or none.
+    """Write files into a folder, which is made where it is missing.
 
-    Complete under temporary names first, then renamed, so no reader ever sees a part of a file.
+    Complete under temporary names first, then renamed: no reader ever sees a part of a file, and a new folder appears
+    with all of them or not at all. In an existing folder they are replaced one by one, where the report is removed
+    first and comes last: a folder that has one holds results of one run.
     """
     out = Path(out)
     ancestor = next(path for path in (out, *out.absolute().parents) if path.exists())
@@ -226,7 +237,8 @@ def write_folder(out: str | os.PathLike[str], files: Mapping[str, bytes]) -> Non
             for name, data in files.items():
                 (stage / name).write_bytes(data)
             if out.exists():
-                for name in files:
+                (out / _REPORT).unlink(missing_ok=True)
+                for name in sorted(files, key=_REPORT.__eq__):
                     os.replace(stage / name, out / name)
             else:
                 out.absolute().parent.mkdir(parents=True, exist_ok=True)

@@ -116,6 +116,15 @@ def label_statistics(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.nda
     return np.column_stack([first, last - first + 1, area]).astype(np.int32), centroids
 
 
+def seeding(func: str, minDistance: float, separation: float) -> tuple[float, float]:
+    """The parameters of `extractSeeds`, checked."""
+    minDistance = number(func, "minDistance", minDistance, 0, above=True)
+    separation = number(func, "separation", separation, 0, 1, above=True)
+    if separation == 1:
+        raise fail(func, "separation", "below 1", described(separation), cv2.Error.StsOutOfRange)
+    return minDistance, separation
+
+
 def _seeds(
     func: str, distance: np.ndarray, minDistance: float, separation: float, mask: np.ndarray | None
 ) -> tuple[int, np.ndarray]:
@@ -124,10 +133,7 @@ def _seeds(
         raise error(func, f"`distance` must have fewer than 2^30 pixels, got {distance.size}", cv2.Error.StsOutOfRange)
     if not distance.min() >= 0:  # NaN fails, too
         raise fail(func, "distance", ">= 0 everywhere", f"a least value of {distance.min():g}")
-    minDistance = number(func, "minDistance", minDistance, 0, above=True)
-    separation = number(func, "separation", separation, 0, 1, above=True)
-    if separation == 1:
-        raise fail(func, "separation", "below 1", described(separation), cv2.Error.StsOutOfRange)
+    minDistance, separation = seeding(func, minDistance, separation)
     mask = None if mask is None else image8(func, "mask", mask, distance.shape)
     markers = np.empty(distance.shape, np.int32)
     return _core.extract_seeds(distance, mask, minDistance, separation, markers) + 1, markers

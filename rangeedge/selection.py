@@ -114,7 +114,7 @@ def selectEdges(
 ) -> np.ndarray:
     """Select edge pixels by strength, by connection to strong ones, by length and by chain statistics.
 
-    selectEdges(jump, crease, jumpThreshold[, creaseThreshold[, hysteresis[, minLength[, dynamic[, dst]]]]]) -> dst
+    selectEdges(jump, crease, jumpThreshold[, creaseThreshold], *[, hysteresis[, minLength[, dynamic[, dst]]]]) -> dst
 
     The steps run in this order, each on what the one before has left:
 
@@ -215,10 +215,11 @@ def _grey_levels(strength: np.ndarray, cut: float) -> np.ndarray:
 
 def _reaching(jump: np.ndarray, crease: np.ndarray, thresholds: tuple[float, float]) -> np.ndarray:
     """Where a positive strength reaches its threshold, as bool."""
-    return _at_least(jump, thresholds[0]) | _at_least(crease, thresholds[1])
+    return at_least(jump, thresholds[0]) | at_least(crease, thresholds[1])
 
 
-def _at_least(strength: np.ndarray, threshold: float) -> np.ndarray:
+def at_least(strength: np.ndarray, threshold: float) -> np.ndarray:
+    """Where a positive strength reaches a threshold, which may be 0 or more than a float32 holds."""
     if threshold > float(np.finfo(np.float32).max):
         return np.zeros(strength.shape, bool)
     threshold = np.float32(threshold)

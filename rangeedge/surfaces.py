@@ -1,6 +1,8 @@
-"""Planes and quadrics through the points of regions."""
+"""Surfaces: what kernels take to fit them, and planes and quadrics through the points of regions."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -9,6 +11,46 @@ from .geometry import RangeFrame
 SURFACE = np.dtype([("curved", np.bool_), ("centroid", "3f8"), ("normal", "3f8"), ("quadric", "10f8"), ("rms", "f8")])
 _CURVED_GAIN = 0.8  # a quadratic must lower the rms of a plane to this share
 _QUADRIC_POINTS = 40  # fewer tell no curvature
+
+
+def surface_map(frame: RangeFrame, coefficients: tuple[float, ...], noise_map: np.ndarray | None) -> dict[str, Any]:
+    """What the kernels on surfaces take: places on the image plane, ordinates and their noise; no edges."""
+    x, y, to_plane = _places(frame)
+    seen = frame.ordinate[frame.valid.view(bool)]
+    offset = float(seen[:: max(1, len(seen) // 4096)].mean(dtype=np.float64)) if len(seen) else 0.0
+    return dict(
+        x=x,
+        y=y,
+        ordinate=(frame.ordinate - frame.ordinate.dtype.type(offset)).astype(np.float32, copy=False),
+        offset=offset,
+        projective=frame.projective,
+        to_plane=to_plane,
+        noise=coefficients[:3],
+        noise_map=noise_map,
+        edges=None,
+    )
+
+
+def _places(frame: RangeFrame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[float, ...]]:
+    """Where pixels lie on the image plane, in units of about a pixel, and how that becomes coordinates.
+
+    None for a regular grid: columns and rows.
+    """
+    if frame.samples.ndim == 2:
+        return None, None, frame.to_plane
+    axis = np.asarray(frame.axis)
+    across = np.cross((0, 1, 0) if abs(axis[1]) < 0.9 else (1, 0, 0), axis)
+    across /= np.linalg.norm(across)
+    points = frame.samples.astype(np.float64)
+    x, y = points @ across, points @ np.cross(axis, across)
+    if frame.projective:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            x, y = x / (points @ axis), y / (points @ axis)
+    steps = np.concatenate([np.hypot(np.diff(x, axis=k), np.diff(y, axis=k)).ravel() for k in (0, 1)])
+    steps = steps[steps > 0]  # and so not NaN
+    spacing = float(np.median(steps)) if len(steps) else 1.0
+    to_plane = (spacing, 0.0, 0.0, 0.0, spacing, 0.0)
+    return (x / spacing).astype(np.float32), (y / spacing).astype(np.float32), to_plane
 
 
 def surfaces_of(frame: RangeFrame, labels: np.ndarray, count: int, heightMap: bool) -> np.ndarray:

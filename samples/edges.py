@@ -1,4 +1,4 @@
-"""Edges of a range image by kind, sheet what cv2.Canny finds in the same depths.
+"""Edges of a range image by kind, beside what cv2.Canny finds in the same depths.
 
     python samples/edges.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
 

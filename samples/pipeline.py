@@ -26,13 +26,13 @@ class Candidate(NamedTuple):
     unevenness: float  # root mean square distance of the surface from a plane under the cup
 
 
-def candidates(depth, K, cup=0.015, unevenness=0.003):
+def candidates(depth, K, depthFactor=1000.0, cup=0.015, unevenness=0.003):
     """Places for a suction cup of radius `cup` where the surface is even; the nearest first."""
-    labels = rangeedge.segmentRegions(depth, K=K)
+    labels = rangeedge.segmentRegions(depth, K=K, depthFactor=depthFactor)
     labels = cv2.medianBlur(labels.astype(np.uint16), 5)  # pixels without data here and there do no harm
     inside = (cv2.dilate(labels, np.ones((3, 3))) == labels) & (cv2.erode(labels, np.ones((3, 3))) == labels)
     distance = rangeedge.distanceTransform(~inside)
-    points = points_of(depth, K)
+    points = points_of(depth, K, depthFactor)
     outermost = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
     found = []
     for label in np.setdiff1d(labels, [0, *outermost]):
@@ -44,9 +44,9 @@ def candidates(depth, K, cup=0.015, unevenness=0.003):
     return sorted((c for c in found if c.unevenness <= unevenness), key=lambda c: c.center[2])
 
 
-def points_of(depth, K):
-    """Points (H, W, 3) in metres of a depth image in millimetres or metres; NaN without data."""
-    z = depth / 1000.0 if depth.dtype.kind == "u" else depth.astype(np.float64)
+def points_of(depth, K, depthFactor):
+    """Points (H, W, 3) of a depth image, the integers of which `depthFactor` divides; NaN without data."""
+    z = depth / depthFactor if depth.dtype.kind in "ui" else depth.astype(np.float64)
     z = np.where(z > 0, z, np.nan)
     y, x = np.indices(depth.shape)
     return np.dstack([(x - K[0, 2]) / K[0, 0] * z, (y - K[1, 2]) / K[1, 1] * z, z])
@@ -92,7 +92,7 @@ def main(argv=None):
     if "K" not in geometry:
         arguments.error("a depth image of a pinhole camera is needed: give -K fx,fy,cx,cy")
 
-    found = candidates(depth, geometry["K"], args.cup)
+    found = candidates(depth, geometry["K"], geometry.get("depthFactor", 1000.0), args.cup)
     print(f"{len(found)} candidates")
 
     picture = draw(relief(depth, geometry), found, geometry["K"], args.cup)

@@ -2,14 +2,15 @@
 
 import json
 import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from rangeedge import error, imwriteRange
+from rangeedge import NoiseModel, error, imwriteRange
 from rangeedge.batch import detectBatch
 from rangeedge.cli import main
-from rangeedge.results import EDGE_FILES
+from rangeedge.results import EDGE_FILES, plain
 
 K = np.array([[50, 0, 19.5], [0, 50, 14.5], [0, 0, 1]])
 
@@ -68,23 +69,66 @@ def test_does_again_what_is_out_of_date(images, tmp_path):
     assert json.loads(report.read_text())["width"] == 40
 
 
-def test_bad_options_fail_every_image(images, tmp_path):
-    items = list(detectBatch(images, tmp_path / "out", K=K, eps=-1.0))
+def test_options_that_do_not_fit_an_image_fail_that_image(images, tmp_path):
+    items = list(detectBatch(images, tmp_path / "out", K=K, mask=np.ones((5, 6), np.uint8)))
     assert states(items) == ["failed"] * 3
-    assert "`eps`" in items[0].message
+    assert "`mask`" in items[0].message
 
 
 @pytest.mark.parametrize(
-    ("options", "message"), [({"jobs": 0}, "`jobs`"), ({"force": 1}, "`force`"), ({"jobs": True}, "`jobs`")]
+    ("options", "message"),
+    [
+        ({"jobs": 0}, "`jobs`"),
+        ({"force": 1}, "`force`"),
+        ({"jobs": True}, "`jobs`"),
+        ({"eps": -1.0}, "`eps`"),
+        ({"hysteresis": 2}, "`hysteresis`"),
+        ({"maxshift": 3}, "unknown argument `maxshift`; did you mean `maxShift`"),
+    ],
 )
-def test_bad_arguments(images, tmp_path, options, message):
-    with pytest.raises(error, match=message):
+def test_bad_arguments_are_refused_before_any_image(images, tmp_path, options, message):
+    with pytest.raises(error, match=f"detectBatch: {message}"):
         detectBatch(images, tmp_path / "out", **options)
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("kind", [str, bytes, Path])
+def test_one_path_is_no_list_of_them(images, tmp_path, kind):
+    one = os.fsencode(images[0]) if kind is bytes else kind(images[0])
+    with pytest.raises(error, match="detectBatch: `paths` must be an iterable of file names"):
+        detectBatch(one, tmp_path / "out")
+
+
+def test_options_of_numpy_and_infinities(images, tmp_path):
+    options = {"creaseThreshold": np.float32(30), "jumpThreshold": np.inf, "minLength": np.int64(4), "K": K}
+    assert states(detectBatch(images[:1], tmp_path / "out", **options)) == ["written"]
+    assert states(detectBatch(images[:1], tmp_path / "out", **options)) == ["skipped"]
+    report = json.loads((tmp_path / "out" / "frame0" / "report.json").read_text(), parse_constant=pytest.fail)
+    assert report["options"]["jumpThreshold"] == "inf"
+    assert report["options"]["creaseThreshold"] == 30
+
+
+def test_options_as_json():
+    nested = {
+        "K": ((np.float32(1.5), 2), [np.nan]),
+        "flag": np.True_,
+        "noise": NoiseModel(np.float64(0.5)),
+        "eps": None,
+    }
+    assert plain(nested) == {
+        "K": [[1.5, 2], ["nan"]],
+        "flag": True,
+        "noise": {"a": 0.5, "b": 0, "c": 0, "correlation": 1},
+        "eps": None,
+    }
+    assert plain(np.array([1, -np.inf])) == [1, "-inf"]
 
 
 def test_two_images_of_one_name(images, tmp_path):
     with pytest.raises(error, match="same folder"):
         detectBatch([images[0], images[0].with_suffix(".tiff")], tmp_path / "out")
+    with pytest.raises(error, match="same folder"):
+        detectBatch([images[0], images[0]], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

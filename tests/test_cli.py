@@ -25,7 +25,7 @@ from rangeedge import (
     segmentRegionsWithStats,
 )
 from rangeedge.cli import main
-from rangeedge.results import EDGE_FILES, REGION_FILES, write_folder
+from rangeedge.results import EDGE_FILES, REGION_FILES, find_regions, region_files, write_folder
 
 K = np.array([[100, 0, 39.5], [0, 100, 29.5], [0, 0, 1]])
 CAMERA = ["-K", "100,100,39.5,29.5"]
@@ -339,6 +339,16 @@ def _root():
     return os.path.dirname(os.path.dirname(rangeedge.__file__))
 
 
+def test_more_regions_or_seeds_than_16_bits_number():
+    found = find_regions(box(), K=K)
+    seeds = np.full_like(found.seeds, 70000)
+    with pytest.raises(ValueError, match=r"seeds\.png has room for 65535 seeds, 70000 were found"):
+        region_files(found._replace(seeds=seeds), "box", {})
+    surfaces = np.zeros(70001, found.surfaces.dtype)
+    with pytest.raises(ValueError, match=r"labels\.png has room for 65535 regions, 70000 were found"):
+        region_files(found._replace(surfaces=surfaces, seeds=seeds), "box", {})
+
+
 class TestWriteFolder:
     def test_all_or_nothing(self, tmp_path):
         with pytest.raises(ValueError, match="cannot write"):
@@ -351,6 +361,24 @@ class TestWriteFolder:
             write_folder(tmp_path, {"a.txt": b"new", "missing/b.txt": b"b"})
         assert (tmp_path / "a.txt").read_text() == "old"
         assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]
+
+    def test_a_folder_half_replaced_has_no_report(self, tmp_path, monkeypatch):
+        files = {"report.json": b"old", "a.txt": b"old", "b.txt": b"old"}
+        write_folder(tmp_path, files)
+        replace = os.replace
+
+        def fails(source, target):
+            if target.name == "b.txt":
+                raise OSError(28, "No space left on device")
+            replace(source, target)
+
+        monkeypatch.setattr(os, "replace", fails)
+        with pytest.raises(ValueError, match="No space left"):
+            write_folder(tmp_path, dict.fromkeys(files, b"new"))
+        assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == {"a.txt": b"new", "b.txt": b"old"}
+        monkeypatch.undo()
+        write_folder(tmp_path, dict.fromkeys(files, b"new"))
+        assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == dict.fromkeys(files, b"new")
 
     def test_relative_name(self, tmp_path, monkeypatch):
         monkeypatch.chdir(tmp_path)
@@ -435,3 +463,9 @@ class TestBench:
         code, _, complaint = run(capsys, "bench", image, *CAMERA, "--repeat", 0)
         assert code == 2
         assert "repeat" in complaint
+
+    @pytest.mark.parametrize("argv", [CAMERA, ["--pixel-size", "2"], ["--height-map"]])
+    def test_geometry_wants_an_image(self, capsys, argv):
+        code, said, complaint = run(capsys, "bench", *argv, "--repeat", 1)
+        assert (code, said) == (2, "")
+        assert argv[0] in complaint

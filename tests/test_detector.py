@@ -25,7 +25,7 @@ from rangeedge import (
     selectEdges,
     thinEdges,
 )
-from rangeedge.detector import ScanLineDetector, selected_of
+from rangeedge.detector import ScanLineDetector, Selection, selected_of
 
 K = np.array([[200, 0, 47.5], [0, 210, 35.5], [0, 0, 1]])
 FORMATS = ["xml", "yml", "yaml", "json"]
@@ -109,10 +109,32 @@ def test_stray_crease_pixels_do_not_count_nor_jumps_on_the_farther_side():
     crease[1, 3:5] = 40
     jump[8] = jump[7] = 1
     kind[7], kind[8] = EDGE_OCCLUDING | EDGE_JUMP, EDGE_OCCLUDED | EDGE_JUMP
-    edges = selected_of("test", EdgeStrength(jump, crease, kind, jump), minLength=1)
+    edges = selected_of(EdgeStrength(jump, crease, kind, jump), Selection(minLength=1).checked("test"))
     expected = np.zeros((9, 9), np.uint8)
     expected[4:6, 1:8] = expected[7] = 255
     np.testing.assert_array_equal(edges, expected)
+
+
+@pytest.mark.parametrize("creaseThreshold", [0, 1e-300])
+def test_stray_creases_do_not_count_at_no_threshold_either(creaseThreshold):
+    nothing, crease = np.zeros((2, 9, 9), np.float32)
+    crease[4:6, 1:8] = 1
+    crease[1, 3:5] = 1
+    selection = Selection(creaseThreshold=creaseThreshold, minLength=1).checked("test")
+    edges = selected_of(EdgeStrength(nothing, crease, nothing.astype(np.uint8), nothing), selection)
+    assert not edges[1].any()
+    assert edges[4:6, 1:8].all()
+
+
+def test_creases_of_a_single_line_stay():
+    line = 0.1 * np.abs(np.arange(60.0) - 30)[None]
+    for src in (line, line.T):
+        edges = detectEdges(np.ascontiguousarray(src), 1.0, 5.0, noise=0.001, minLength=1)
+        assert 29 <= np.flatnonzero(edges).mean() <= 31
+
+
+def test_no_crease_reaches_more_than_a_float_holds(scene):
+    assert not detectEdges(scene, np.inf, 1e300, K=K, noise=0.001).any()
 
 
 def test_rim_of_the_nearer_surface_is_the_jump_edge(scene):
@@ -436,13 +458,16 @@ def test_a_truncated_file_is_an_error_or_whole(tmp_path, suffix):
     whole, cut = tmp_path / f"whole.{suffix}", tmp_path / f"cut.{suffix}"
     detector.save(whole)
     content = whole.read_bytes()
-    for size in range(0, len(content) - 2, 19):
+    for size in range(len(content)):
         cut.write_bytes(content[:size])
         other = createScanLineDetector()
         try:
             other.load(cut)
         except rangeedge.error:
             same(get_all(other), vars(ScanLineParams()))
+        else:  # nothing is missing but the end of the last line
+            assert size > len(content) - 20
+            same(get_all(other), OTHER)
 
 
 def test_missing_files_and_bad_names(tmp_path, detector):

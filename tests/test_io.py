@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import rangeedge
-from rangeedge.io import imreadRange, imwriteRange, write_atomically
+from rangeedge._files import write_atomically
+from rangeedge.io import imreadRange, imwriteRange
 from rangeedge.pointcloud import lzf_decompress
 from rangeedge.scanners import abwPoints, perceptronPoints
 

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rangeedge import imwriteRange
+from rangeedge import imreadRange, imwriteRange
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
 
 SAMPLES = Path(__file__).resolve().parents[1] / "samples"
@@ -96,3 +96,25 @@ def test_pipeline_needs_a_camera(tmp_path, capsys):
     assert end.value.code == 2
     assert "pinhole camera" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_geometry_given_replaces_that_of_the_file(tmp_path):
+    common = importlib.import_module("common")
+    depth = np.full((60, 80), 1000, np.uint16)
+    imwriteRange(tmp_path / "grid.npz", depth, pixelSize=(0.5, 0.5), heightMap=True, depthFactor=500)
+    _, geometry = common.load(common.parser("").parse_args([str(tmp_path / "grid.npz"), "-K", "50,50,39.5,29.5"]))
+    assert geometry.keys() == {"K", "depthFactor"}
+    assert geometry["depthFactor"] == 500
+    imwriteRange(tmp_path / "camera.npz", depth, K=np.diag([50.0, 50, 1]))
+    _, geometry = common.load(common.parser("").parse_args([str(tmp_path / "camera.npz"), "--pixel-size", "2"]))
+    assert geometry == {"pixelSize": 2}
+
+
+def test_pipeline_heeds_the_depth_factor(image, tmp_path):
+    src, geometry = imreadRange(image)
+    imwriteRange(tmp_path / "tenths.npz", 10 * src, K=geometry["K"], depthFactor=10000)
+    run("pipeline", image, "--out", tmp_path / "one")
+    run("pipeline", tmp_path / "tenths.npz", "--out", tmp_path / "other")
+    one, other = ((tmp_path / name / "candidates.csv").read_text() for name in ("one", "other"))
+    assert one == other
+    assert one.count("\n") > 1
