@@ -23,7 +23,7 @@ from .thinning import thinEdges
 
 
 def benchmark(src: np.ndarray, *, repeat: int = 20, mask: np.ndarray | None = None, **geometry: Any) -> dict[str, Any]:
-    """Time the stages one after another in one process.
+    """Time the stages in turn, again and again, in one process.
 
     benchmark(src[, repeat[, mask[, K[, pixelSize[, heightMap[, depthFactor]]]]]]) -> retval
 
@@ -46,7 +46,7 @@ def benchmark(src: np.ndarray, *, repeat: int = 20, mask: np.ndarray | None = No
         On a bad argument.
     """
     repeat = integer("benchmark", "repeat", repeat, 1)
-    stages = _stages(src, mask, geometry)
+    times = timed(stages(src, mask, geometry), repeat)
     return {
         "width": src.shape[1],
         "height": src.shape[0],
@@ -54,7 +54,7 @@ def benchmark(src: np.ndarray, *, repeat: int = 20, mask: np.ndarray | None = No
         "rangeedge": __version__,
         "opencv": cv2.__version__,
         "numpy": np.__version__,
-        "stages": {name: _timed(stage, repeat) for name, stage in stages.items()},
+        "stages": times,
     }
 
 
@@ -66,7 +66,7 @@ def table(result: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _stages(src: np.ndarray, mask: np.ndarray | None, geometry: dict[str, Any]) -> dict[str, Callable[[], Any]]:
+def stages(src: np.ndarray, mask: np.ndarray | None, geometry: dict[str, Any]) -> dict[str, Callable[[], Any]]:
     """What is timed, by name; results of earlier stages are the input of later ones."""
     depth = range_frame("benchmark", src, mask=mask, **geometry).depth
     grey = cv2.normalize(np.nan_to_num(depth), None, 0, 255, cv2.NORM_MINMAX, cv2.CV_8U)
@@ -91,11 +91,12 @@ def _stages(src: np.ndarray, mask: np.ndarray | None, geometry: dict[str, Any]) 
     }
 
 
-def _timed(stage: Callable[[], Any], repeat: int) -> dict[str, float]:
-    stage()
-    times = []
-    for _ in range(repeat):
-        start = time.perf_counter()
-        stage()
-        times.append(1000 * (time.perf_counter() - start))
-    return {"min": min(times), "median": statistics.median(times)}
+def timed(calls: dict[str, Callable[[], Any]], repeat: int) -> dict[str, dict[str, float]]:
+    """Least and median milliseconds of each call. They take turns, so that a busy machine slows all alike."""
+    times: dict[str, list[float]] = {name: [] for name in calls}
+    for _ in range(1 + repeat):
+        for name, call in calls.items():
+            start = time.perf_counter()
+            call()
+            times[name].append(1000 * (time.perf_counter() - start))
+    return {name: {"min": min(t[1:]), "median": statistics.median(t[1:])} for name, t in times.items()}

@@ -21,6 +21,20 @@ struct Vector {
     double x, y, z;
 };
 
+// A candidate close to another; the weight falls with the distance.
+struct Neighbour {
+    const Candidate* candidate;
+    float weight;
+};
+
+// The first `count` items; reused from candidate to candidate.
+struct Neighbours {
+    std::vector<Neighbour> items;
+    std::size_t count = 0;
+    const Neighbour* begin() const { return items.data(); }
+    const Neighbour* end() const { return items.data() + count; }
+};
+
 // A copy of the candidates by square cells of the image, for those near a given one.
 class Grid {
 public:
@@ -39,30 +53,20 @@ public:
         }
     }
 
-    // Calls visit(candidate, index in the vector that was copied) for all of them, cell by cell.
+    // Calls visit(candidate, its neighbours, its index in the vector that was copied) for all, cell by cell.
     template <class Visit>
     void for_each(int threads, Visit&& visit) const {
         parallel_for(static_cast<int>(candidates_.size()), threads, [&](int begin, int end, int) {
-            for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k)
-                visit(candidates_[k], static_cast<std::size_t>(places_[k].index));
+            Neighbours near;
+            for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+                find(candidates_[k], near);
+                visit(candidates_[k], near, static_cast<std::size_t>(places_[k].index));
+            }
         });
-    }
-
-    // Calls visit(candidate, weight) for c itself and every candidate within reach that shares a kind with it.
-    template <class Visit>
-    void for_each_near(const Candidate& c, Visit&& visit) const {
-        const int u = column(c), v = row(c);
-        const int left = std::max(0, u - 1), right = std::min(cols_ - 1, u + 1);
-        for (int y = std::max(0, v - 1); y <= std::min(rows_ - 1, v + 1); ++y) {
-            const auto last = start_[cell(right, y) + 1];
-            for (auto first = start_[cell(left, y)]; first < last; first += block_size)
-                visit_block(first, std::min(last, first + block_size), c, visit);
-        }
     }
 
 private:
     static constexpr int cell_size = 4;  // pixels, no less than the reach
-    static constexpr int block_size = 64;
 
     // What the search needs to know of a candidate.
     struct Place {
@@ -71,21 +75,27 @@ private:
         std::int32_t index;
     };
 
-    // Lists those within reach before it visits them: a branch on each would be mispredicted too often.
-    template <class Visit>
-    void visit_block(std::int32_t first, std::int32_t last, const Candidate& c, Visit&& visit) const {
-        float weights[block_size];
-        std::int32_t near[block_size];
-        int count = 0;
-        for (auto k = first; k < last; ++k) {
-            const Place& n = places_[static_cast<std::size_t>(k)];
-            const float du = n.x - c.x, dv = n.y - c.y;
-            const float rest = 1 - (du * du + dv * dv) / (reach * reach);
-            weights[count] = rest * rest;
-            near[count] = k;
-            count += static_cast<int>(rest > 0) & static_cast<int>((n.kind & c.kind) != 0);
+    // Finds c itself and every candidate within reach that shares a kind with it.
+    void find(const Candidate& c, Neighbours& near) const {
+        const int u = column(c), v = row(c);
+        const int left = std::max(0, u - 1), right = std::min(cols_ - 1, u + 1);
+        near.count = 0;
+        for (int y = std::max(0, v - 1); y <= std::min(rows_ - 1, v + 1); ++y) {
+            const auto first = static_cast<std::size_t>(start_[cell(left, y)]);
+            const auto last = static_cast<std::size_t>(start_[cell(right, y) + 1]);
+            if (near.items.size() < near.count + last - first) near.items.resize(2 * (near.count + last - first));
+            // Written before it is known to count: a branch on each would be mispredicted too often.
+            Neighbour* items = near.items.data();
+            std::size_t count = near.count;
+            for (std::size_t k = first; k < last; ++k) {
+                const Place& n = places_[k];
+                const float du = n.x - c.x, dv = n.y - c.y;
+                const float rest = 1 - (du * du + dv * dv) / (reach * reach);
+                items[count] = {&candidates_[k], rest * rest};
+                count += static_cast<std::size_t>(rest > 0) & static_cast<std::size_t>((n.kind & c.kind) != 0);
+            }
+            near.count = count;
         }
-        for (int i = 0; i < count; ++i) visit(candidates_[static_cast<std::size_t>(near[i])], weights[i]);
     }
 
     int column(const Candidate& c) const { return std::min(std::max(static_cast<int>(c.x) / cell_size, 0), cols_ - 1); }
@@ -100,12 +110,12 @@ private:
     std::vector<Candidate> candidates_;
 };
 
-float joint_significance(const Grid& grid, const Candidate& c) {
+float joint_significance(const Candidate& c, const Neighbours& near) {
     float sum = 0;
-    grid.for_each_near(c, [&](const Candidate& n, float weight) {
-        const float s = std::min(n.significance, capped);
-        sum += weight * s * s;
-    });
+    for (const Neighbour& n : near) {
+        const float s = std::min(n.candidate->significance, capped);
+        sum += n.weight * s * s;
+    }
     return std::max(std::sqrt(sum), c.significance * lone);
 }
 
@@ -142,12 +152,13 @@ struct CommonLine {
     bool found;
 };
 
-CommonLine common_line(const Grid& grid, const Candidate& c) {
+CommonLine common_line(const Candidate& c, const Neighbours& near) {
     double n = 0, mx = 0, my = 0, sxx = 0, sxy = 0, syy = 0;
-    grid.for_each_near(c, [&](const Candidate& near, float weight) {
-        const double w = static_cast<double>(weight), x = static_cast<double>(near.x - c.x), y = static_cast<double>(near.y - c.y);
+    for (const Neighbour& other : near) {
+        const double w = static_cast<double>(other.weight);
+        const double x = static_cast<double>(other.candidate->x - c.x), y = static_cast<double>(other.candidate->y - c.y);
         n += w, mx += w * x, my += w * y, sxx += w * x * x, sxy += w * x * y, syy += w * y * y;
-    });
+    }
     mx /= n, my /= n;
     sxx = sxx / n - mx * mx, sxy = sxy / n - mx * my, syy = syy / n - my * my;
     const double angle = 0.5 * std::atan2(2 * sxy, sxx - syy);  // of the line
@@ -166,9 +177,9 @@ Step step_of(const Candidate& c) {
 
 // Moves a crease along its scan line onto the line it has in common with its neighbours, unless that leads off the data.
 template <class T>
-void align(const Grid& grid, const Candidate& c, const RangeImage<T>& image, double max_shift, Candidate& moved) {
+void align(const Candidate& c, const Neighbours& near, const RangeImage<T>& image, double max_shift, Candidate& moved) {
     if ((c.kind & jump_bit) || !(c.crease > 0)) return;
-    const CommonLine line = common_line(grid, c);
+    const CommonLine line = common_line(c, near);
     const Step step = step_of(c);
     const double along = step.dcol * line.across[0] + step.drow * line.across[1];
     if (!line.found || std::abs(along) < 0.3) return;
@@ -185,22 +196,22 @@ void align(const Grid& grid, const Candidate& c, const RangeImage<T>& image, dou
 }
 
 // The angle between the two surfaces that meet at c, in degrees; negative where its neighbours do not fix it.
-double normal_angle(const Grid& grid, const Candidate& c, bool projective) {
-    const CommonLine line = common_line(grid, c);
+double normal_angle(const Candidate& c, const Neighbours& near, bool projective) {
+    const CommonLine line = common_line(c, near);
     if (!line.found) return -1;
     const double* across = line.across;
-    const double n = line.weight;
     Gradient a, b;
     double place[2] = {0, 0};
-    grid.for_each_near(c, [&](const Candidate& near, float weight) {
-        const double w = static_cast<double>(weight);
-        const Step step = step_of(near);
+    for (const Neighbour& n : near) {
+        const Candidate& other = *n.candidate;
+        const double w = static_cast<double>(n.weight);
+        const Step step = step_of(other);
         const bool forward = step.dcol * across[0] + step.drow * across[1] > 0;
-        a.add(near.along, near.sides[forward ? 0 : 1], w);
-        b.add(near.along, near.sides[forward ? 1 : 0], w);
-        for (int i = 0; i < 2; ++i) place[i] += w * static_cast<double>(near.place[i]);
-    });
-    for (double& p : place) p /= n;
+        a.add(other.along, other.sides[forward ? 0 : 1], w);
+        b.add(other.along, other.sides[forward ? 1 : 0], w);
+        for (int i = 0; i < 2; ++i) place[i] += w * static_cast<double>(other.place[i]);
+    }
+    for (double& p : place) p /= line.weight;
     Vector na{}, nb{};
     if (!a.normal(projective, place, na) || !b.normal(projective, place, nb)) return -1;
     const Vector cross{na.y * nb.z - na.z * nb.y, na.z * nb.x - na.x * nb.z, na.x * nb.y - na.y * nb.x};
@@ -217,20 +228,22 @@ void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const 
     // Each step sees all candidates as the step before left them.
     const auto update = [&](auto&& step) {
         const Grid grid(candidates, image.rows, image.cols);
-        grid.for_each(parameters.threads, [&](const Candidate& c, std::size_t i) { step(grid, c, candidates[i]); });
+        grid.for_each(parameters.threads, [&](const Candidate& c, const Neighbours& near, std::size_t i) {
+            step(c, near, candidates[i]);
+        });
     };
-    update([](const Grid& grid, const Candidate& c, Candidate& joined) {
-        joined.significance = joint_significance(grid, c);
+    update([](const Candidate& c, const Neighbours& near, Candidate& joined) {
+        joined.significance = joint_significance(c, near);
     });
     const auto weak = [&](const Candidate& c) { return c.significance < least; };
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), weak), candidates.end());
     for (int round = 0; round < align_rounds; ++round)
-        update([&](const Grid& grid, const Candidate& c, Candidate& moved) {
-            align(grid, c, image, parameters.max_shift, moved);
+        update([&](const Candidate& c, const Neighbours& near, Candidate& moved) {
+            align(c, near, image, parameters.max_shift, moved);
         });
     if (!parameters.normals) return;
-    update([&](const Grid& grid, const Candidate& c, Candidate& measured) {
-        const double angle = c.crease > 0 ? normal_angle(grid, c, image.projective) : -1;
+    update([&](const Candidate& c, const Neighbours& near, Candidate& measured) {
+        const double angle = c.crease > 0 ? normal_angle(c, near, image.projective) : -1;
         if (angle >= 0) measured.crease = static_cast<float>(angle);
     });
 }

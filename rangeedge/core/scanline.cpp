@@ -74,10 +74,13 @@ Worst<float> worst_of_lanes(const float* y, const float* scale, const ThreePoint
         worst = larger ? r : worst;
         at = larger ? index : at;
     }
-    Worst<float> result{worst[0], at[0]};
-    for (int i = 1; i < 8; ++i)
-        if (worst[i] > result.residual || (worst[i] == result.residual && at[i] < result.at)) result = {worst[i], at[i]};
-    return result;
+    // Across the lanes, without branches: which is the worst cannot be foretold.
+    float most = worst[0];
+    for (int i = 1; i < 8; ++i) most = worst[i] > most ? worst[i] : most;
+    at = worst == most ? at : last;
+    int first_at = at[0];
+    for (int i = 1; i < 8; ++i) first_at = std::min(first_at, at[i]);
+    return {most, first_at};
 }
 
 template <class T>
