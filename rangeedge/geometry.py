@@ -86,8 +86,9 @@ def range_frame(
     inside = None if mask is None else image8(func, "mask", mask, src.shape[:2]) != 0
     if src.ndim == 3:
         return _points(func, src, inside, K, pixelSize, heightMap)
-    if heightMap and src.dtype.kind != "f":
-        raise fail(func, "src", "float heights where heightMap is True", described(src), cv2.Error.StsUnsupportedFormat)
+    if heightMap and src.dtype.kind == "i":
+        expected = "heights as floats (or unsigned integers, 0 for no data) where heightMap is True"
+        raise fail(func, "src", expected, described(src), cv2.Error.StsUnsupportedFormat)
     if K is not None:
         frame = _pinhole(_lengths(func, src, depthFactor), camera_matrix(func, "K", K))
     else:

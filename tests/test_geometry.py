@@ -288,5 +288,5 @@ def test_masked_arrays_and_whole_heights_are_refused():
     heights = np.ma.masked_equal(np.arange(400.0).reshape(20, 20), 7)
     with pytest.raises(rangeedge.error, match=r"edgeStrength: `src` must be .* got a masked array"):
         edgeStrength(heights, heightMap=True)
-    with pytest.raises(rangeedge.error, match="edgeStrength: `src` must be float heights"):
+    with pytest.raises(rangeedge.error, match="edgeStrength: `src` must be heights as floats"):
         edgeStrength(np.arange(400, dtype=np.int16).reshape(20, 20), heightMap=True)
