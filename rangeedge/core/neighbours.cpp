@@ -156,7 +156,8 @@ CommonLine common_line(const Candidate& c, const Neighbours& near) {
     double n = 0, mx = 0, my = 0, sxx = 0, sxy = 0, syy = 0;
     for (const Neighbour& other : near) {
         const double w = static_cast<double>(other.weight);
-        const double x = static_cast<double>(other.candidate->x - c.x), y = static_cast<double>(other.candidate->y - c.y);
+        const double x = static_cast<double>(other.candidate->x - c.x);
+        const double y = static_cast<double>(other.candidate->y - c.y);
         n += w, mx += w * x, my += w * y, sxx += w * x * x, sxy += w * x * y, syy += w * y * y;
     }
     mx /= n, my /= n;
@@ -177,7 +178,8 @@ Step step_of(const Candidate& c) {
 
 // Moves a crease along its scan line onto the line it has in common with its neighbours, unless that leads off the data.
 template <class T>
-void align(const Candidate& c, const Neighbours& near, const RangeImage<T>& image, double max_shift, Candidate& moved) {
+void align(const Candidate& c, const Neighbours& near, const RangeImage<T>& image, double max_shift,
+           Candidate& moved) {
     if ((c.kind & jump_bit) || !(c.crease > 0)) return;
     const CommonLine line = common_line(c, near);
     const Step step = step_of(c);
