@@ -40,8 +40,8 @@ SurfaceImage::SurfaceImage(const RangeMap& map, double lateral)
         return std::max(projective_ ? length * ordinate * ordinate : length, least);
     };
     std::vector<double> sigmas;
-    for (int k = 0; k < rows_ * cols_; ++k)
-        if ((k % sample_step == 0 || sigmas.empty()) && std::isfinite(map.ordinate[k])) sigmas.push_back(sigma(k));
+    for (int k = 0; k < rows_ * cols_; k += sigmas.empty() ? 1 : sample_step - k % sample_step)
+        if (std::isfinite(map.ordinate[k])) sigmas.push_back(sigma(k));
     if (sigmas.empty()) return;
     const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
     std::nth_element(sigmas.begin(), middle, sigmas.end());
