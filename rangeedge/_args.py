@@ -21,6 +21,9 @@ class error(cv2.error, ValueError):
         super().__init__(msg)
         self.code, self.func, self.err, self.msg = code, func, err, msg
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.func, self.err, self.code)
+
 
 def fail(func: str, name: str, expected: str, got: Any, code: int = cv2.Error.StsBadArg) -> error:
     """The exception for argument `name` of `func`; the caller raises it."""
@@ -48,6 +51,8 @@ def array(func: str, name: str, value: Any, expected: str, ndim: Collection[int]
     """A non-empty array of real numbers with one of the allowed numbers of dimensions."""
     if not isinstance(value, np.ndarray):
         raise fail(func, name, expected, type(value).__name__)
+    if isinstance(value, np.ma.MaskedArray):
+        raise fail(func, name, f"{expected}, masked pixels filled with NaN or left out by `mask`", "a masked array")
     if value.ndim not in ndim:
         raise fail(func, name, expected, described(value), cv2.Error.StsBadSize)
     if value.size == 0:
@@ -74,7 +79,8 @@ def image32f(func: str, name: str, value: Any, shape: tuple[int, int] | None = N
     value = array(func, name, value, expected)
     if shape is not None and value.shape != shape:
         raise fail(func, name, expected, described(value), cv2.Error.StsUnmatchedSizes)
-    return np.ascontiguousarray(value, dtype=np.float32)
+    with np.errstate(over="ignore"):
+        return np.ascontiguousarray(value, dtype=np.float32)
 
 
 def labels32s(func: str, name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
@@ -132,9 +138,12 @@ def camera_matrix(func: str, name: str, value: Any) -> np.ndarray:
     """The 3x3 matrix of a pinhole camera, as float64."""
     expected = "a 3x3 camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with finite entries and fx, fy > 0"
     try:
-        matrix = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+        matrix = np.array(value)
+    except ValueError:
         raise fail(func, name, expected, described(value)) from None
+    if matrix.dtype.kind not in "iuf":
+        raise fail(func, name, expected, described(value))
+    matrix = matrix.astype(np.float64)
     if matrix.shape != (3, 3):
         raise fail(func, name, expected, described(value), cv2.Error.StsBadSize)
     upper = matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[1, 0] == 0 and np.array_equal(matrix[2], (0, 0, 1))

@@ -92,12 +92,14 @@ def stages(src: np.ndarray, mask: np.ndarray | None, geometry: dict[str, Any]) -
     }
 
 
-def timed(calls: dict[str, Callable[[], Any]], repeat: int) -> dict[str, dict[str, float]]:
+def timed(
+    calls: dict[str, Callable[[], Any]], repeat: int, clock: Callable[[], float] = time.perf_counter
+) -> dict[str, dict[str, float]]:
     """Least and median milliseconds of each call. They take turns, so that a busy machine slows all alike."""
     times: dict[str, list[float]] = {name: [] for name in calls}
     for _ in range(1 + repeat):
         for name, call in calls.items():
-            start = time.perf_counter()
+            start = clock()
             call()
-            times[name].append(1000 * (time.perf_counter() - start))
+            times[name].append(1000 * (clock() - start))
     return {name: {"min": min(t[1:]), "median": statistics.median(t[1:])} for name, t in times.items()}

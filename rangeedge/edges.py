@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 
 from . import _core
-from ._args import array, described, error, fail, flag, integer, number
+from ._args import array, boolean, described, error, errors_of, fail, flag, integer, number
 from ._constants import (
     CREASE_MAX,
     CREASE_NORMAL,
@@ -108,6 +108,8 @@ class ScanLineParams:
         if self.eps is not None:
             number(func, "eps", self.eps, 0, above=True)
         number(func, "epsFactor", self.epsFactor, 0, above=True)
+        number(func, "depthFactor", self.depthFactor, 0, above=True)
+        boolean(func, "heightMap", self.heightMap)
         integer(func, "directions", self.directions, 1, DIR_ALL)
         flag(func, "fit", self.fit, {"FIT_LSQ": FIT_LSQ, "FIT_INTERP": FIT_INTERP})
         measures = {"MEASURE_MIDPOINT": MEASURE_MIDPOINT, "MEASURE_ENDPOINT": MEASURE_ENDPOINT}
@@ -116,6 +118,13 @@ class ScanLineParams:
         for name in ("maxShift", "mergeSignificance", "minSignificance"):
             number(func, name, getattr(self, name), 0)
         integer(func, "maxGap", self.maxGap, 0)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, ScanLineParams):
+            return NotImplemented
+        return all(np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
+
+    __hash__ = None  # arrays have no hash
 
     @classmethod
     def paper(cls, **options: Any) -> ScanLineParams:
@@ -141,10 +150,8 @@ def params_of(func: str, eps: float | None, options: dict[str, Any]) -> ScanLine
             close = difflib.get_close_matches(name, names, 1)
             hint = f"; did you mean `{close[0]}`?" if close else ""
             raise error(func, f"unknown argument `{name}`{hint}")
-    try:
+    with errors_of(func):
         return ScanLineParams(eps=eps, **options)
-    except error as problem:
-        raise error(func, problem.err, problem.code) from None
 
 
 def takes_scan_line_params(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -232,7 +239,7 @@ def edgeStrength(
 ) -> EdgeStrength:
     """Measure how strong an edge every pixel of a range image is, and of which kind.
 
-    edgeStrength(src[, eps[, mask[, K[, ...]]]]) -> jump, crease, kind, significance
+    edgeStrength(src[, eps], *[, mask[, K[, ...]]]) -> jump, crease, kind, significance
 
     Rows, columns and both diagonals are approximated by curves (P§4.1). At a cut between two of them, f1 and f2,
 
@@ -246,7 +253,8 @@ def edgeStrength(
     src : ndarray
         (H, W) depth, or points (H, W, 3) or (H, W, 4) in the camera frame (x right, y down, z away).
         Integers are divided by `depthFactor` and invalid where <= 0. With `K`, depths that are not positive and
-        finite are invalid; without it, only non-finite values are. A point is invalid if a coordinate is not finite.
+        finite are invalid; without it, only non-finite values are. Heights (`heightMap`) may not be signed integers.
+        A point is invalid if a coordinate is not finite, if all are 0, or if it lies behind the viewpoint.
     eps : float, optional
         Splitting tolerance as a length; None derives it from the noise.
     mask : ndarray of shape (H, W), 8-bit or bool, optional
@@ -302,7 +310,7 @@ def edgePoints(
 ) -> np.ndarray:
     """Find the edge candidates of every scan line, with subpixel positions.
 
-    edgePoints(src[, eps[, mask[, K[, ...]]]]) -> points
+    edgePoints(src[, eps], *[, mask[, K[, ...]]]) -> points
 
     Parameters
     ----------
@@ -313,7 +321,8 @@ def edgePoints(
     -------
     points : structured ndarray of shape (N,)
         x, y (pixels, subpixel), jump (length), crease (degrees), kind (EDGE_* bits), significance, direction
-        (a DIR_* bit). An edge that several scan lines cross gives several points. In `kind`, EDGE_OCCLUDING says that
+        (a DIR_* bit). An edge that several scan lines cross gives several points. In `kind`, which never holds
+        EDGE_BOUNDARY here, EDGE_OCCLUDING says that
         the surface before the point along its scan line (left of it, or above on a column) is the nearer one,
         EDGE_OCCLUDED that it is the farther one.
 

@@ -81,18 +81,23 @@ def range_frame(
         raise fail(func, "pixelSize", "None where K is given", described(pixelSize))
     if K is not None and heightMap:
         raise fail(func, "heightMap", "False where K is given (its values are depths)", heightMap)
+    if src.shape[0] * src.shape[1] >= 1 << 31:
+        raise fail(func, "src", "an image of fewer than 2**31 pixels", described(src), cv2.Error.StsBadSize)
+    inside = None if mask is None else image8(func, "mask", mask, src.shape[:2]) != 0
     if src.ndim == 3:
-        frame = _points(func, src, K, pixelSize, heightMap)
-    elif K is not None:
+        return _points(func, src, inside, K, pixelSize, heightMap)
+    if heightMap and src.dtype.kind == "i":
+        expected = "heights as floats (or unsigned integers, 0 for no data) where heightMap is True"
+        raise fail(func, "src", expected, described(src), cv2.Error.StsUnsupportedFormat)
+    if K is not None:
         frame = _pinhole(_lengths(func, src, depthFactor), camera_matrix(func, "K", K))
     else:
         spacing = (1.0, 1.0) if pixelSize is None else pixel_size(func, "pixelSize", pixelSize)
         frame = _grid(_lengths(func, src, depthFactor), spacing, heightMap)
-    if mask is None:
+    if inside is None:
         return frame
-    outside = image8(func, "mask", mask, frame.shape) == 0
     samples = frame.samples.copy() if np.shares_memory(frame.samples, src) else frame.samples
-    samples[outside] = np.nan
+    samples[~inside] = np.nan
     return RangeFrame(samples, frame.projective, frame.to_plane, frame.axis)
 
 
@@ -124,7 +129,9 @@ def _grid(values: np.ndarray, spacing: tuple[float, float], heightMap: bool) -> 
     return RangeFrame(height, False, (spacing[0], 0.0, 0.0, 0.0, spacing[1], 0.0))
 
 
-def _points(func: str, src: np.ndarray, K: Any, pixelSize: Any, heightMap: bool) -> RangeFrame:
+def _points(
+    func: str, src: np.ndarray, inside: np.ndarray | None, K: Any, pixelSize: Any, heightMap: bool
+) -> RangeFrame:
     if src.shape[2] not in (3, 4) or src.dtype.kind != "f":
         raise fail(func, "src", SRC + ", points being floats", described(src), cv2.Error.StsUnsupportedFormat)
     for name, value in (("K", K), ("pixelSize", pixelSize)):
@@ -132,18 +139,28 @@ def _points(func: str, src: np.ndarray, K: Any, pixelSize: Any, heightMap: bool)
             raise fail(func, name, "None where src holds points", described(value))
     dtype = np.float64 if src.dtype.itemsize > 4 else np.float32
     points = np.array(src[..., :3], dtype=dtype, order="C")
-    points[~np.isfinite(points).all(axis=2)] = np.nan
+    # Three zeros are what cameras write where they see nothing.
+    points[~np.isfinite(points).all(axis=2) | (points == 0).all(axis=2)] = np.nan
+    if inside is not None:
+        points[~inside] = np.nan
     if heightMap:
         return RangeFrame(points, False, axis=(0.0, 0.0, -1.0))
     central = points[np.isfinite(points[..., 2])].astype(np.float64)
     if not len(central) or not _is_projective(points):
         return RangeFrame(points, False)
-    if central[:, 2].min() > 0:
-        return RangeFrame(points, True)
-    rays = central / np.maximum(np.linalg.norm(central, axis=1, keepdims=True), np.finfo(np.float64).tiny)
-    axis = rays.mean(axis=0)
+    axis = _viewing_axis(central)
+    with np.errstate(invalid="ignore"):
+        points[~(points @ np.asarray(axis, dtype) > 0)] = np.nan
+    return RangeFrame(points, True, axis=axis)
+
+
+def _viewing_axis(points: np.ndarray) -> tuple[float, ...]:
+    """The z axis where all points lie before it, else the mean of their rays."""
+    if points[:, 2].min() > 0:
+        return 0.0, 0.0, 1.0
+    axis = (points / np.linalg.norm(points, axis=1, keepdims=True)).mean(axis=0)
     length = np.linalg.norm(axis)
-    return RangeFrame(points, True, axis=tuple((axis / length).tolist()) if length > 0.1 else (0.0, 0.0, 1.0))
+    return tuple((axis / length).tolist()) if length > 0.1 else (0.0, 0.0, 1.0)
 
 
 def _is_projective(points: np.ndarray) -> bool:

@@ -99,7 +99,7 @@ def estimateNoise(
 ) -> NoiseModel:
     """Estimate the noise of a range image from the image itself.
 
-    estimateNoise(src[, K[, pixelSize[, heightMap[, depthFactor[, mask]]]]]) -> retval
+    estimateNoise(src, *[, K[, pixelSize[, heightMap[, depthFactor[, mask]]]]]) -> retval
 
     Third differences along rows and columns vanish on every quadratic; on noise they have sqrt(20) times its
     deviation. Edges are few among them: sigma is the root mean square of the smaller three quarters, corrected for the
@@ -115,7 +115,7 @@ def estimateNoise(
     -------
     retval : NoiseModel
         In the unit of the image. Never below 3e-5 of the distance (of the range of heights on a grid), so that
-        the rounding of noise-free images counts as noise.
+        the rounding of noise-free images counts as noise; that is also what is left where no window is valid.
 
     Raises
     ------
@@ -143,7 +143,7 @@ def noise_of(frame: RangeFrame) -> NoiseModel:
     if not frame.projective:
         return NoiseModel(a=max(near_sigma, _FINEST * _extent(ordinates)), correlation=correlation)
     if len(differences) == 0:
-        return NoiseModel(c=1.0)
+        return NoiseModel(b=_FINEST)
     a, c = _fitted(*_deviation_by_depth(differences, ordinates))
     nearest = 1 / float(ordinates.max())
     if a + c * nearest**2 < _FINEST * nearest:
@@ -157,10 +157,10 @@ def _third_differences(ordinate: np.ndarray, lag: int) -> tuple[np.ndarray, np.n
     The mean of a window is independent of its difference, so that bins of it do not select among the differences.
     Of a large image every so many lines are enough.
     """
-    found, where = [np.empty(0, ordinate.dtype)], [np.empty(0, ordinate.dtype)]
+    found, where = [np.empty(0)], [np.empty(0)]
     for y in (ordinate, ordinate.T):
         if len(y) > 3 * lag:
-            y = np.ascontiguousarray(y[:, :: 1 + y.size // _WINDOWS])
+            y = y[:, :: 1 + y.size // _WINDOWS].astype(np.float64)
             outer, inner = (y[: -3 * lag], y[3 * lag :]), (y[lag : -2 * lag], y[2 * lag : -lag])
             d = np.abs(outer[1] - outer[0] - 3 * (inner[1] - inner[0]))
             inside = np.isfinite(d)
@@ -227,6 +227,8 @@ def kernel_noise(func: str, noise: Any, frame: RangeFrame) -> tuple[tuple[float,
     elif not isinstance(noise, (NoiseModel, np.ndarray)):
         noise = NoiseModel(a=number(func, "noise", noise, 0, above=True))
     if isinstance(noise, NoiseModel):
+        if min(noise.a, noise.b, noise.c) < 0 and not (noise(np.abs(frame.depth[frame.valid > 0])) > 0).all():
+            raise fail(func, "noise", "a model that is positive at every depth of the image", noise)
         return (noise.a, noise.b, noise.c, noise.correlation), None
     expected = f"a number, a NoiseModel, or a real array of shape {frame.shape}, > 0 at valid pixels"
     if noise.shape != frame.shape or noise.dtype.kind not in "iuf":

@@ -36,7 +36,7 @@ REFINEMENTS = ("merged", "dissolved")  # of least-squares approximations, in thi
 CURVED_SIGNIFICANCE = 5.0  # of the quadratic term
 STRADDLING = 2.0  # how much more, in significance, a segment across an edge may cost
 LONE_SIGNIFICANCE = 3.0
-JUMP_TOLERANCES = 2.0
+JUMP_TOLERANCES, JUMP_ALONE = 2.0, 12.0
 REACH, CAPPED, LONE_SHARE = 4.0, 8.0, 1 / 3  # pixels; standard deviations
 ALIGN_ROUNDS, LEAST_SLOPE = 2, 0.3
 LEAST_SPREAD, LEAST_DIRECTIONS = 0.05, (0.02, 1e-9)
@@ -448,7 +448,8 @@ class Detector:
         if x is None:
             return stay
         if xa <= x <= xb:
-            return a, b, x, a + (b - a) * (x - xa) / (xb - xa), True
+            sample = a + (b - a) * (x - xa) / (xb - xa)
+            return (a, b, x, sample, True) if abs(sample - (a + b) / 2) <= self.p.maxShift else stay
         # The first sample passed over, and the curve to which it would belong.
         step, k, end, curve = (-1, a, left.first, right.curve) if x < xa else (1, b, right.last, left.curve)
         while k != end:
@@ -490,7 +491,7 @@ class Detector:
         crease = math.degrees(abs(bend)) if crease_significance >= least else 0.0
         kind = 0
         error = JUMP_TOLERANCES * max(line.tolerance[before], line.tolerance[after])
-        if jump > 0 and abs(yf - yg) > error and jump_significance >= self.p.minSignificance:
+        if jump > 0 and abs(yf - yg) > error and jump_significance > JUMP_ALONE:
             kind |= EDGE_JUMP | (EDGE_OCCLUDING if yf > yg else EDGE_OCCLUDED)
         if crease > 0:
             kind |= EDGE_CONVEX if bend > 0 else EDGE_CONCAVE
@@ -501,6 +502,7 @@ class Detector:
         return Candidate(
             x=u + sample * dx,
             y=v + sample * dy,
+            shift=sample - (left.last + right.first) / 2,
             jump=jump,
             crease=crease,
             significance=max(jump_significance if jump > 0 else 0.0, crease_significance if crease > 0 else 0.0),
@@ -525,6 +527,7 @@ def _adjacent(line, left, right):
 class Candidate:
     x: float
     y: float
+    shift: float
     jump: float
     crease: float
     significance: float
@@ -546,7 +549,7 @@ class Neighbourhood:
 
     def pooled(self):
         params = self.image.params
-        if not params.minSignificance > 0 and params.crease != CREASE_NORMAL:
+        if params.minSignificance == 0 == params.maxShift and params.crease != CREASE_NORMAL:
             return self.found
         joint = [replace(c, significance=self._joint_significance(c)) for c in self.found]
         kept = Neighbourhood([c for c in joint if c.significance >= params.minSignificance], self.image)
@@ -574,7 +577,7 @@ class Neighbourhood:
         across, distance = line
         dx, dy = STEPS[c.direction]
         slope = dx * across[0] + dy * across[1]
-        if abs(slope) < LEAST_SLOPE or abs(distance / slope) > self.image.params.maxShift:
+        if abs(slope) < LEAST_SLOPE or abs(c.shift + distance / slope) > self.image.params.maxShift:
             return c
         x, y = c.x + distance / slope * dx, c.y + distance / slope * dy
         u = math.floor(x) if dx else round(x)
@@ -582,7 +585,7 @@ class Neighbourhood:
         pixels = ((u, v), (u + dx, v + dy))
         if not all(self.image.has_data(*pixel) for pixel in pixels):
             return c
-        return replace(c, x=x, y=y, pixels=pixels)
+        return replace(c, x=x, y=y, shift=c.shift + distance / slope, pixels=pixels)
 
     def _near(self, c):
         """Candidates of a common kind within reach, with weights."""

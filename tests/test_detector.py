@@ -312,7 +312,7 @@ def test_only_parameters_make_a_detector(params):
         createScanLineDetector(params)
 
 
-@pytest.mark.parametrize("options", [{"K": np.eye(4)}, {"noise": -1}, {"pixelSize": (1, 2, 3)}, {"heightMap": "yes"}])
+@pytest.mark.parametrize("options", [{"K": np.eye(4)}, {"noise": -1}, {"pixelSize": (1, 2, 3)}])
 def test_parameters_that_wait_for_an_image_are_checked_at_once(options):
     name = next(iter(options))
     with pytest.raises(rangeedge.error, match=f"createScanLineDetector: `{name}` must be"):

@@ -1,6 +1,7 @@
 """Edge strengths and points: against the oracle, under symmetries, for every kind of input."""
 
 import inspect
+import pickle
 from dataclasses import fields
 
 import cv2
@@ -583,3 +584,33 @@ def test_other_floats_are_converted(dtype):
     expected = edgeStrength(z, noise=0.001)
     got = edgeStrength(z.astype(dtype), noise=0.001)
     assert all(np.allclose(a, b, rtol=1e-5) for a, b in zip(expected, got, strict=True))
+
+
+def test_significance_is_what_the_threshold_compares():
+    rng = np.random.default_rng(8)
+    z = np.where(np.arange(80) < 40, 1.0, 1.05) * np.ones((60, 1)) + rng.normal(0, 0.005, (60, 80))
+    all_of_them = edgePoints(z, noise=0.005, maxShift=0.0, minSignificance=6.0)
+    for least in (9.0, 12.0, 20.0):
+        kept = edgePoints(z, noise=0.005, maxShift=0.0, minSignificance=least)
+        assert len(kept) == (all_of_them["significance"] >= least).sum()
+
+
+@pytest.mark.parametrize("reach", [0.3, 1.0, 4.0])
+def test_edges_stay_within_reach_of_their_cut(reach):
+    z = np.abs(np.arange(80) - 40.2) * 0.5 * np.ones((60, 1)) + np.random.default_rng(9).normal(0, 0.3, (60, 80))
+    options = dict(noise=0.3, minSignificance=0.0, crease=CREASE_MAX, directions=DIR_ROWS)
+    cuts, moved = edgePoints(z, maxShift=0.0, **options), edgePoints(z, maxShift=reach, **options)
+    assert len(cuts) == len(moved)
+    assert 0 < np.abs(cuts["x"] - moved["x"]).max() <= reach + 1e-5
+
+
+def test_errors_travel_between_processes():
+    with pytest.raises(rangeedge.error) as raised:
+        edgeStrength(None)
+    copy = pickle.loads(pickle.dumps(raised.value))
+    assert (copy.func, copy.err, copy.code, str(copy)) == (
+        raised.value.func,
+        raised.value.err,
+        raised.value.code,
+        str(raised.value),
+    )

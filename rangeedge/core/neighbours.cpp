@@ -156,7 +156,8 @@ CommonLine common_line(const Candidate& c, const Neighbours& near) {
     double n = 0, mx = 0, my = 0, sxx = 0, sxy = 0, syy = 0;
     for (const Neighbour& other : near) {
         const double w = static_cast<double>(other.weight);
-        const double x = static_cast<double>(other.candidate->x - c.x), y = static_cast<double>(other.candidate->y - c.y);
+        const double x = static_cast<double>(other.candidate->x - c.x);
+        const double y = static_cast<double>(other.candidate->y - c.y);
         n += w, mx += w * x, my += w * y, sxx += w * x * x, sxy += w * x * y, syy += w * y * y;
     }
     mx /= n, my /= n;
@@ -177,18 +178,20 @@ Step step_of(const Candidate& c) {
 
 // Moves a crease along its scan line onto the line it has in common with its neighbours, unless that leads off the data.
 template <class T>
-void align(const Candidate& c, const Neighbours& near, const RangeImage<T>& image, double max_shift, Candidate& moved) {
+void align(const Candidate& c, const Neighbours& near, const RangeImage<T>& image, double max_shift,
+           Candidate& moved) {
     if ((c.kind & jump_bit) || !(c.crease > 0)) return;
     const CommonLine line = common_line(c, near);
     const Step step = step_of(c);
     const double along = step.dcol * line.across[0] + step.drow * line.across[1];
     if (!line.found || std::abs(along) < 0.3) return;
-    const double shift = line.offset / along;
-    if (std::abs(shift) > max_shift) return;
+    const double shift = line.offset / along, total = static_cast<double>(c.shift) + shift;
+    if (std::abs(total) > max_shift) return;
     const double x = static_cast<double>(c.x) + shift * step.dcol, y = static_cast<double>(c.y) + shift * step.drow;
     const int u = static_cast<int>(step.dcol ? std::floor(x) : std::round(x));
     const int v = static_cast<int>(step.drow > 0 ? std::floor(y) : step.drow < 0 ? std::ceil(y) : std::round(y));
     if (!image.valid_at(u, v) || !image.valid_at(u + step.dcol, v + step.drow)) return;
+    moved.shift = static_cast<float>(total);
     moved.x = static_cast<float>(x);
     moved.y = static_cast<float>(y);
     moved.before = v * image.cols + u;
@@ -224,7 +227,7 @@ double normal_angle(const Candidate& c, const Neighbours& near, bool projective)
 template <class T>
 void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const Parameters& parameters) {
     const auto least = static_cast<float>(parameters.min_significance);
-    if (!(least > 0) && !parameters.normals) return;
+    if (!(least > 0 || parameters.max_shift > 0 || parameters.normals)) return;
     // Each step sees all candidates as the step before left them.
     const auto update = [&](auto&& step) {
         const Grid grid(candidates, image.rows, image.cols);

@@ -2,11 +2,15 @@
 #include "regions.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstring>
 #include <map>
 #include <utility>
 #include <vector>
+
+#include "components.hpp"
 
 namespace rangeedge {
 namespace {
@@ -20,6 +24,7 @@ constexpr double most = 0.6;          // of a border
 constexpr double explained = 0.7;     // of the pixels of a small patch
 constexpr double least_open = 0.2;    // of the border of one that is no surface of its own
 constexpr double least_border = 0.5;  // in square roots of the smaller area
+constexpr int reassignments = 3;
 const double degree = std::acos(-1.0) / 180;
 
 // Pixels by residual, the smallest first, first come first served among equals.
@@ -57,7 +62,9 @@ private:
 class Grower {
 public:
     Grower(const RangeMap& map, const RegionParameters& parameters)
-        : image_(map, lateral_deviation), parameters_(parameters), patch_(static_cast<std::size_t>(image_.size()), 0) {
+        : image_(map, lateral_deviation), parameters_(parameters), patch_(static_cast<std::size_t>(image_.size()), 0),
+          free_(patch_.size(), taken) {
+        for_pixels([&](int p) { assign(p, 0); });
         create(SurfaceSums(), Surface());
     }
 
@@ -70,10 +77,14 @@ public:
     int finish(std::int32_t* labels);
 
 private:
+    // What may take a pixel: `reach` of a flood is the last of them that it fills.
+    enum Free : std::uint8_t { taken, open_pixel, edge_pixel };
+
     struct Patch {
         SurfaceSums sums;
         Surface surface;
         int refit_at;
+        int uncut;      // pixels it had when it was found to be no roof
         int same;       // the patch that has taken this one in, or itself
         int region;     // a patch of the same region, or itself
         bool absorbed;  // joined a much larger one, and joins no other
@@ -87,7 +98,16 @@ private:
     };
     using Borders = std::map<std::pair<int, int>, Border>;
 
-    int& patch(int p) { return patch_[static_cast<std::size_t>(p)]; }
+    int patch(int p) const { return patch_[static_cast<std::size_t>(p)]; }
+    void assign(int p, int i) {
+        patch_[static_cast<std::size_t>(p)] = i;
+        free_[static_cast<std::size_t>(p)] =
+            i || !image_.valid(p) ? taken : image_.open(p) ? open_pixel : edge_pixel;
+    }
+    bool is_free(int p, Free reach) const {
+        const std::uint8_t state = free_[static_cast<std::size_t>(p)];
+        return state != taken && state <= reach;
+    }
     Patch& of(int i) { return patches_[static_cast<std::size_t>(i)]; }
     int owner(int p) {
         int i = patch(p);
@@ -106,30 +126,45 @@ private:
             for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; ++p) visit(p);
     }
 
+    // Free pixels, in raster order; most images have few.
+    template <class F>
+    void for_free(Free reach, F&& visit) const {
+        for (std::size_t p = 0, end = free_.size(); p < end;) {
+            std::uint64_t eight = 1;
+            if (p + 8 <= end) std::memcpy(&eight, &free_[p], 8);
+            const std::size_t stop = eight ? std::min(p + 8, end) : p;
+            for (std::size_t q = p; q < stop; ++q)
+                if (is_free(static_cast<int>(q), reach)) visit(static_cast<int>(q));
+            p += 8;
+        }
+    }
+
     static int later(int count) { return count + count / 3 + 16; }
     int create(const SurfaceSums& sums, const Surface& surface);
     void add_patches(const Pixels& pixels, int cuts);
     void cut_roofs();
-    void offer(ResidualQueue& queue, int p, int i, double limit) const;
-    void flood(double tolerance, bool edges_too);
+    void offer(int p, int i, double limit);
+    void flood(double tolerance, Free reach);
     void refit();
     void reassign();
     std::vector<std::pair<int, int>> contacts();
     Borders borders(const std::vector<std::pair<int, int>>& contacts);
     bool one_surface(const Patch& a, const Patch& b) const;
     bool belongs(int small, int large, const Border& border);
-    template <class F>
-    void for_components(F&& visit);
+    std::vector<int> regions();
+    Components components();
 
     SurfaceImage image_;
     RegionParameters parameters_;
-    std::vector<int> patch_;  // of every pixel, 0: none
+    std::vector<int> patch_;          // of every pixel, 0: none
+    std::vector<std::uint8_t> free_;  // of every pixel
+    ResidualQueue queue_;
     std::vector<Patch> patches_;
 };
 
 int Grower::create(const SurfaceSums& sums, const Surface& surface) {
     const int i = static_cast<int>(patches_.size());
-    patches_.push_back({sums, surface, later(sums.count()), i, i, false});
+    patches_.push_back({sums, surface, later(sums.count()), 0, i, i, false});
     return i;
 }
 
@@ -144,15 +179,18 @@ void Grower::add_patches(const Pixels& pixels, int cuts) {
         return;
     }
     const int i = create(sums, surface);
-    for (const int p : pixels) patch(p) = i;
+    for (const int p : pixels) assign(p, i);
 }
 
 void Grower::sow(const std::int32_t* markers) {
     std::map<std::int32_t, Pixels> seeds;
+    std::pair<std::int32_t, Pixels*> last{0, nullptr};
     for (int row = 0; row < image_.rows(); ++row)
         for (int col = 0; col < image_.cols(); ++col) {
             const std::int32_t marker = markers[row * image_.cols() + col];
-            if (marker > 0 && image_.open(image_.index(row, col))) seeds[marker].push_back(image_.index(row, col));
+            if (marker <= 0 || !image_.open(image_.index(row, col))) continue;
+            if (marker != last.first) last = {marker, &seeds[marker]};
+            last.second->push_back(image_.index(row, col));
         }
     std::vector<Pixels> sets;
     for (auto& seed : seeds) sets.push_back(std::move(seed.second));
@@ -162,51 +200,47 @@ void Grower::sow(const std::int32_t* markers) {
 
 // Components of what is free and open with all its neighbours.
 void Grower::sow_rest() {
-    std::vector<char> free(patch_.size(), 0);
+    std::vector<std::uint8_t> inside(free_.size(), 0);
     const int stride = image_.stride();
-    const auto is_free = [&](int p) { return image_.open(p) && !patch(p); };
-    const auto in_row = [&](int p) { return is_free(p - 1) && is_free(p) && is_free(p + 1); };
-    for_pixels([&](int p) {
-        free[static_cast<std::size_t>(p)] = is_free(p) && in_row(p) && in_row(p - stride) && in_row(p + stride);
+    const auto in_row = [&](int p) {
+        return is_free(p - 1, open_pixel) && is_free(p, open_pixel) && is_free(p + 1, open_pixel);
+    };
+    bool any = false;
+    for_free(open_pixel, [&](int p) {
+        const bool found = in_row(p) && in_row(p - stride) && in_row(p + stride);
+        inside[static_cast<std::size_t>(p)] = found;
+        any |= found;
     });
+    if (!any) return;
+    const Components parts(inside.data(), image_.rows(), image_.cols());
     Pixels pixels;
-    for_pixels([&](int start) {
-        if (!free[static_cast<std::size_t>(start)]) return;
-        pixels.assign(1, start);
-        free[static_cast<std::size_t>(start)] = 0;
-        for (std::size_t k = 0; k < pixels.size(); ++k)
-            for (const int step : image_.neighbours()) {
-                const int q = pixels[k] + step;
-                if (!free[static_cast<std::size_t>(q)]) continue;
-                free[static_cast<std::size_t>(q)] = 0;
-                pixels.push_back(q);
-            }
+    for (int i = 0; i < parts.count(); ++i) {
+        pixels.clear();
+        for (const auto [begin, end] : parts.runs(i))
+            for (int p = begin; p < end; ++p) pixels.push_back(p);
         add_patches(pixels, 0);
-    });
+    }
 }
 
-void Grower::offer(ResidualQueue& queue, int p, int i, double limit) const {
-    const double r = image_.residual(p, patches_[static_cast<std::size_t>(i)].surface);
-    if (r < limit) queue.push(static_cast<std::size_t>(r / limit * levels), {p, i});
+void Grower::offer(int p, int i, double limit) {
+    const double r = image_.residual(p, of(i).surface);
+    if (r < limit) queue_.push(static_cast<std::size_t>(r / limit * levels), {p, i});
 }
 
 // All patches grow at once, the best fitting pixel first; surfaces follow their pixels, but not into edges.
-void Grower::flood(double tolerance, bool edges_too) {
+void Grower::flood(double tolerance, Free reach) {
     const double limit = tolerance * tolerance;
     const auto neighbours = image_.neighbours();
-    const auto is_free = [&](int p) { return !patch(p) && (edges_too ? image_.valid(p) : image_.open(p)); };
-    ResidualQueue queue;
-    for_pixels([&](int p) {
-        if (!is_free(p)) return;
+    for_free(reach, [&](int p) {
         for (const int step : neighbours)
-            if (patch(p + step)) offer(queue, p, patch(p + step), limit);
+            if (patch(p + step)) offer(p, patch(p + step), limit);
     });
     ResidualQueue::Entry entry{};
-    while (queue.pop(entry)) {
+    while (queue_.pop(entry)) {
         const auto [p, i] = entry;
-        if (patch(p)) continue;
-        Patch& grown = of(i);
-        if (!edges_too) {
+        if (!is_free(p, reach)) continue;
+        if (reach == open_pixel) {
+            Patch& grown = of(i);
             if (image_.residual(p, grown.surface) >= limit) continue;
             grown.sums.add(image_.sample(p));
             if (grown.count() >= grown.refit_at) {
@@ -214,9 +248,10 @@ void Grower::flood(double tolerance, bool edges_too) {
                 grown.refit_at = later(grown.count());
             }
         }
-        patch(p) = i;
+        patch_[static_cast<std::size_t>(p)] = i;
+        free_[static_cast<std::size_t>(p)] = taken;
         for (const int step : neighbours)
-            if (is_free(p + step)) offer(queue, p + step, i, limit);
+            if (is_free(p + step, reach)) offer(p + step, i, limit);
     }
 }
 
@@ -227,15 +262,20 @@ void Grower::refit() {
 
 // Patches that have grown around a crease are two planes.
 void Grower::cut_roofs() {
+    const auto may_be = [&](const Patch& p) {
+        return p.surface.curved && p.count() >= static_cast<int>(least_curved) && p.count() != p.uncut;
+    };
+    if (std::none_of(patches_.begin(), patches_.end(), may_be)) return;
     std::vector<Pixels> pixels(patches_.size());
     for_pixels([&](int p) {
-        if (patch(p) && of(patch(p)).surface.curved) pixels[static_cast<std::size_t>(patch(p))].push_back(p);
+        if (patch(p) && may_be(of(patch(p)))) pixels[static_cast<std::size_t>(patch(p))].push_back(p);
     });
     Pixels first, second;
     for (std::size_t i = 1; i < pixels.size(); ++i) {
-        if (pixels[i].size() < least_curved) continue;
+        if (pixels[i].empty()) continue;
+        patches_[i].uncut = patches_[i].count();
         if (!image_.split_roof(pixels[i], patches_[i].sums.quadratic(), first, second)) continue;
-        for (const int p : pixels[i]) patch(p) = 0;
+        for (const int p : pixels[i]) assign(p, 0);
         patches_[i].sums = SurfaceSums();
         add_patches(first, 1);
         add_patches(second, 1);
@@ -243,10 +283,10 @@ void Grower::cut_roofs() {
 }
 
 void Grower::grow() {
-    flood(parameters_.tolerance, false);
+    flood(parameters_.tolerance, open_pixel);
     refit();
     cut_roofs();
-    flood(parameters_.tolerance, false);
+    flood(parameters_.tolerance, open_pixel);
     refit();
 }
 
@@ -327,60 +367,77 @@ void Grower::merge() {
     }
 }
 
-// Border pixels go to the neighbouring surface they lie on.
+// Border pixels go to the neighbouring surface they lie on, a few steps far.
 void Grower::reassign() {
-    std::vector<std::pair<int, int>> moves;
+    const auto neighbours = image_.neighbours();
+    Pixels pixels;  // that may move
     for_pixels([&](int p) {
         const int own = patch(p);
         if (!own) return;
-        int best = own;
-        double least = -1;
-        for (const int step : image_.neighbours()) {
-            const int other = patch(p + step);
-            if (!other || other == best || other == own) continue;
-            if (least < 0) least = image_.residual(p, of(own).surface);
-            const double r = image_.residual(p, of(other).surface);
-            if (r < least) least = r, best = other;
-        }
-        if (best != own) moves.emplace_back(p, best);
+        for (const int step : neighbours)
+            if (patch(p + step) && patch(p + step) != own) return pixels.push_back(p);
     });
-    for (const auto& [p, i] : moves) patch(p) = i;
+    std::vector<std::pair<int, int>> moves;
+    for (int round = 0; round < reassignments; ++round) {
+        moves.clear();
+        for (const int p : pixels) {
+            const int own = patch(p);
+            if (!own) continue;
+            int best = own;
+            double least = -1;
+            for (const int step : neighbours) {
+                const int other = patch(p + step);
+                if (!other || other == best || other == own) continue;
+                if (least < 0) least = image_.residual(p, of(own).surface);
+                const double r = image_.residual(p, of(other).surface);
+                if (r < least) least = r, best = other;
+            }
+            if (best != own) moves.emplace_back(p, best);
+        }
+        pixels.clear();
+        for (const auto& [p, i] : moves) {
+            assign(p, i);
+            pixels.push_back(p);
+            for (const int step : neighbours) pixels.push_back(p + step);
+        }
+    }
 }
 
 // Edge pixels and what else was left go to the surface they fit best.
 void Grower::settle() {
     for (int& i : patch_)
         while (of(i).same != i) i = of(i).same;
-    flood(loose * parameters_.tolerance, true);
-    for (int round = 0; round < 3; ++round) reassign();
+    flood(loose * parameters_.tolerance, edge_pixel);
+    reassign();
 }
 
 // Strips along rounded edges are no surfaces: small patches, open to their neighbours, whose pixels those explain.
 void Grower::dissolve() {
-    std::map<int, Pixels> around, pixels;
-    std::map<int, Border> total;
+    std::vector<Pixels> around(patches_.size()), pixels(patches_.size());
+    std::vector<Border> total(patches_.size());
     for (const auto& [pair, border] : borders(contacts()))
         for (const auto& [i, j] : {pair, std::make_pair(pair.second, pair.first)}) {
-            around[i].push_back(j);
-            total[i].pixels += border.pixels;
-            total[i].open += border.open;
+            around[static_cast<std::size_t>(i)].push_back(j);
+            total[static_cast<std::size_t>(i)].pixels += border.pixels;
+            total[static_cast<std::size_t>(i)].open += border.open;
         }
-    for (const auto& entry : total) {
-        const int i = entry.first;
-        const Border& border = entry.second;
-        const Pixels& others = around[i];
-        const auto larger = [&](int j) { return is_small(i, j); };
-        if (border.open > least_open * border.pixels && region(i) == i &&
-            std::any_of(others.begin(), others.end(), larger))
-            pixels[i];
-    }
+    const auto is_strip = [&](int i) {
+        const Border& border = total[static_cast<std::size_t>(i)];
+        const Pixels& others = around[static_cast<std::size_t>(i)];
+        return border.open > least_open * border.pixels && region(i) == i &&
+               std::any_of(others.begin(), others.end(), [&](int j) { return is_small(i, j); });
+    };
+    std::vector<char> strip(patches_.size(), 0);
+    for (std::size_t i = 1; i < strip.size(); ++i) strip[i] = is_strip(static_cast<int>(i));
     for_pixels([&](int p) {
         if (!patch(p)) return;
-        const auto found = pixels.find(owner(p));
-        if (found != pixels.end()) found->second.push_back(p);
+        const auto own = static_cast<std::size_t>(owner(p));
+        if (strip[own]) pixels[own].push_back(p);
     });
-    for (const auto& [i, own] : pixels) {
-        Pixels best(own.size(), i);
+    Pixels best;
+    for (std::size_t i = 1; i < pixels.size(); ++i) {
+        const Pixels& own = pixels[i];
+        best.assign(own.size(), static_cast<int>(i));
         int fitting = 0;
         for (std::size_t k = 0; k < own.size(); ++k) {
             double least = HUGE_VAL;
@@ -391,55 +448,45 @@ void Grower::dissolve() {
             fitting += std::sqrt(least) < loose * parameters_.tolerance;
         }
         if (fitting < explained * static_cast<double>(own.size())) continue;
-        for (std::size_t k = 0; k < own.size(); ++k) patch(own[k]) = best[k];
+        for (std::size_t k = 0; k < own.size(); ++k) assign(own[k], best[k]);
     }
 }
 
-// Connected parts of regions, in raster order.
-template <class F>
-void Grower::for_components(F&& visit) {
-    std::vector<int> regions(patches_.size());
-    for (std::size_t i = 0; i < regions.size(); ++i) {
+// Of every patch the one that stands for its region.
+std::vector<int> Grower::regions() {
+    std::vector<int> found(patches_.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
         int k = static_cast<int>(i);
         while (of(k).same != k) k = of(k).same;
-        regions[i] = region(k);
+        found[i] = region(k);
     }
-    std::vector<int> rest(patch_.size());
-    for_pixels([&](int p) { rest[static_cast<std::size_t>(p)] = regions[static_cast<std::size_t>(patch(p))]; });
-    Pixels component;
-    for_pixels([&](int start) {
-        const int own = std::exchange(rest[static_cast<std::size_t>(start)], 0);
-        if (!own) return;
-        component.assign(1, start);
-        for (std::size_t k = 0; k < component.size(); ++k)
-            for (const int step : image_.neighbours()) {
-                int& other = rest[static_cast<std::size_t>(component[k] + step)];
-                if (other != own) continue;
-                other = 0;
-                component.push_back(component[k] + step);
-            }
-        visit(component);
-    });
+    return found;
+}
+
+// Connected parts of regions.
+Components Grower::components() {
+    const std::vector<int> region_of = regions();
+    std::vector<int> image(patch_.size());
+    std::transform(patch_.begin(), patch_.end(), image.begin(),
+                   [&](int i) { return region_of[static_cast<std::size_t>(i)]; });
+    return Components(image.data(), image_.rows(), image_.cols());
 }
 
 int Grower::finish(std::int32_t* labels) {
-    std::vector<Pixels> crumbs;
-    for_components([&](const Pixels& component) {
-        if (static_cast<int>(component.size()) < parameters_.min_area) crumbs.push_back(component);
-    });
-    for (const Pixels& crumb : crumbs)
-        for (const int p : crumb) patch(p) = 0;
-    flood(2 * loose * parameters_.tolerance, true);
+    const Components parts = components();
+    for (int i = 0; i < parts.count(); ++i)
+        if (parts.area(i) < parameters_.min_area)
+            for (const auto [begin, end] : parts.runs(i))
+                for (int p = begin; p < end; ++p) assign(p, 0);
+    flood(2 * loose * parameters_.tolerance, edge_pixel);
     std::fill(labels, labels + image_.rows() * image_.cols(), 0);
-    int count = 0;
-    for_components([&](const Pixels& component) {
-        ++count;
-        for (const int p : component) {
-            const int row = p / image_.stride() - 1, col = p % image_.stride() - 1;
-            labels[row * image_.cols() + col] = count;
+    const Components whole = components();
+    for (int i = 0; i < whole.count(); ++i)
+        for (const auto [begin, end] : whole.runs(i)) {
+            const int row = begin / image_.stride() - 1, col = begin % image_.stride() - 1;
+            std::fill_n(labels + row * image_.cols() + col, end - begin, i + 1);
         }
-    });
-    return count;
+    return whole.count();
 }
 
 }  // namespace

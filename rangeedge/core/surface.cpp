@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "simd.hpp"
+
 namespace rangeedge {
 namespace {
 
@@ -18,7 +20,7 @@ constexpr double dependent = 1e-9;
 
 }  // namespace
 
-void SurfaceSums::add(const Sample& s) {
+RANGEEDGE_WIDE void SurfaceSums::add(const Sample& s) {
     const double u = s.x - x0_, v = s.y - y0_, f = s.ordinate - base_, w = s.weight;
     const double uu = u * u, uv = u * v, vv = v * v;
     const std::array<double, 15> term{1,      u,       v,       uu,      uv,      vv,      u * uu, u * uv,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 
 namespace rangeedge {
 
@@ -22,6 +23,7 @@ struct Surface {
         const double u = x - x0, v = y - y0;
         return c[0] + u * (c[1] + u * c[3] + v * c[4]) + v * (c[2] + v * c[5]);
     }
+    double value_on_plane(double x, double y) const { return c[0] + (x - x0) * c[1] + (y - y0) * c[2]; }
     double slope_x(double x, double y) const { return c[1] + 2 * c[3] * (x - x0) + c[4] * (y - y0); }
     double slope_y(double x, double y) const { return c[2] + c[4] * (x - x0) + 2 * c[5] * (y - y0); }
 };
@@ -33,6 +35,15 @@ public:
     SurfaceSums(double x0, double y0, double base) : x0_(x0), y0_(y0), base_(base) {}
 
     void add(const Sample& s);
+    // Only what a plane takes.
+    void add_to_plane(const Sample& s) {
+        const double u = s.x - x0_, v = s.y - y0_, f = s.ordinate - base_, w = s.weight;
+        const std::array<double, 6> term{1, u, v, u * u, u * v, v * v};
+        for (std::size_t k = 0; k < 6; ++k) power_[k] += w * term[k];
+        for (std::size_t k = 0; k < 3; ++k) product_[k] += w * f * term[k];
+        square_ += w * f * f;
+        ++count_;
+    }
     int count() const { return count_; }
     double x0() const { return x0_; }
     double y0() const { return y0_; }

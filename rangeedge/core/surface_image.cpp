@@ -40,8 +40,8 @@ SurfaceImage::SurfaceImage(const RangeMap& map, double lateral)
         return std::max(projective_ ? length * ordinate * ordinate : length, least);
     };
     std::vector<double> sigmas;
-    for (int k = 0; k < rows_ * cols_; ++k)
-        if ((k % sample_step == 0 || sigmas.empty()) && std::isfinite(map.ordinate[k])) sigmas.push_back(sigma(k));
+    for (int k = 0; k < rows_ * cols_; k += sigmas.empty() ? 1 : sample_step - k % sample_step)
+        if (std::isfinite(map.ordinate[k])) sigmas.push_back(sigma(k));
     if (sigmas.empty()) return;
     const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
     std::nth_element(sigmas.begin(), middle, sigmas.end());
@@ -82,16 +82,26 @@ void SurfaceImage::estimate_correlation(const std::vector<Pixels>& sets) {
     }
 }
 
-SurfaceSums SurfaceImage::sums_of(const Pixels& pixels) const {
+SurfaceSums SurfaceImage::origin_of(const Pixels& pixels) const {
     double x = 0, y = 0, f = 0;
     for (const int p : pixels) {
         const Sample s = sample(p);
         x += s.x, y += s.y, f += s.ordinate;
     }
     const double n = static_cast<double>(std::max<std::size_t>(pixels.size(), 1));
-    SurfaceSums sums(x / n, y / n, f / n);
+    return SurfaceSums(x / n, y / n, f / n);
+}
+
+SurfaceSums SurfaceImage::sums_of(const Pixels& pixels) const {
+    SurfaceSums sums = origin_of(pixels);
     for (const int p : pixels) sums.add(sample(p));
     return sums;
+}
+
+Surface SurfaceImage::plane_of(const Pixels& pixels) const {
+    SurfaceSums sums = origin_of(pixels);
+    for (const int p : pixels) sums.add_to_plane(sample(p));
+    return sums.plane();
 }
 
 bool SurfaceImage::is_flat(const Surface& surface) const { return surface.rms <= flat * correlation_; }
@@ -116,12 +126,13 @@ bool SurfaceImage::split_roof(const Pixels& pixels, const Surface& curved, Pixel
         ((s.x - curved.x0) * cx + (s.y - curved.y0) * cy < 0 ? first : second).push_back(p);
     }
     // The ridge itself may be rounded: neither fits nor the comparison count the pixels along it.
-    Pixels core_first = first, core_second = second;
+    Pixels core_first = first, core_second = second, before_first, before_second;
     double roof = 0, smooth = 0;
     for (int round = 0; round < roof_rounds; ++round) {
         if (core_first.size() < least_pixels || core_second.size() < least_pixels) return false;
-        const Surface a = sums_of(core_first).plane(), b = sums_of(core_second).plane();
+        const Surface a = plane_of(core_first), b = plane_of(core_second);
         const double bend = std::hypot(a.c[1] - b.c[1], a.c[2] - b.c[2]);
+        core_first.swap(before_first), core_second.swap(before_second);
         first.clear(), second.clear(), core_first.clear(), core_second.clear();
         roof = smooth = 0;
         for (const int p : pixels) {
@@ -135,6 +146,7 @@ bool SurfaceImage::split_roof(const Pixels& pixels, const Surface& curved, Pixel
             roof += s.weight * r * r;
             smooth += s.weight * q * q;
         }
+        if (core_first == before_first && core_second == before_second) break;
     }
     return core_first.size() >= least_pixels && core_second.size() >= least_pixels &&
            roof < roof_gain * roof_gain * smooth;

@@ -67,11 +67,16 @@ public:
     double residual(int p, const Surface& s) const {
         const Pixel& pixel = at(p);
         const double x = static_cast<double>(pixel.x), y = static_cast<double>(pixel.y);
+        if (!s.curved) {
+            const double d = static_cast<double>(pixel.ordinate) - s.value_on_plane(x, y);
+            return d * d / variance(pixel, s.c[1], s.c[2]);
+        }
         const double d = static_cast<double>(pixel.ordinate) - s.value(x, y);
         return d * d / variance(pixel, s.slope_x(x, y), s.slope_y(x, y));
     }
 
     SurfaceSums sums_of(const Pixels& pixels) const;
+    Surface plane_of(const Pixels& pixels) const;
     // A plane unless a quadratic is much better.
     Surface surface_of(const SurfaceSums& sums) const;
     bool is_flat(const Surface& surface) const;
@@ -92,6 +97,7 @@ private:
         return correlation_ * correlation_ * static_cast<double>(p.variance) +
                lateral_ * lateral_ * (slope_x * slope_x + slope_y * slope_y);
     }
+    SurfaceSums origin_of(const Pixels& pixels) const;
     std::array<double, 3> normal(const Surface& s, double x, double y) const;
 
     int rows_, cols_;
