@@ -218,6 +218,15 @@ def test_errors_name_detect_edges(scene, options, message):
     assert message in caught.value.err
 
 
+@pytest.mark.parametrize("options", [{"creaseThreshold": -1}, {"minLength": 0}, {"dynamic": 1}])
+def test_selection_is_checked_before_anything_is_computed(scene, detector, options, monkeypatch):
+    monkeypatch.setattr("rangeedge.detector.strength_of", lambda *_: pytest.fail("computed"))
+    with pytest.raises(rangeedge.error, match=f"detectEdges: `{next(iter(options))}`"):
+        detectEdges(scene, **options)
+    with pytest.raises(rangeedge.error, match=f"detectEdges: `{next(iter(options))}`"):
+        detector.detectEdges(scene, **options)
+
+
 def test_a_read_only_destination_is_an_error(scene):
     dst = np.zeros(scene.shape, np.uint8)
     dst.setflags(write=False)

@@ -346,6 +346,14 @@ def test_errors_of_segmentation(options, name):
             function(np.ones((20, 30), np.float32), **options)
 
 
+@pytest.mark.parametrize("options", [{"tolerance": 0}, {"minArea": 0}, {"separation": 1.0}])
+def test_parameters_are_checked_before_anything_is_computed(options, monkeypatch):
+    for name in ("noise_of", "found_edges"):
+        monkeypatch.setattr(f"rangeedge.regions.{name}", lambda *_: pytest.fail("computed"))
+    with pytest.raises(rangeedge.error, match=f"`{next(iter(options))}`"):
+        segmentRegions(np.ones((20, 30), np.float32), **options)
+
+
 @pytest.mark.parametrize(
     ("options", "name"),
     [*BAD_FIELDS, ({"newSeeds": 1}, "newSeeds"), ({"markers": np.zeros((20, 30))}, "markers"),
