@@ -86,7 +86,7 @@ def grow_regions(
     parameters: RegionParameters,
     labels: NDArray[np.int32],
 ) -> int: ...
-def verify_surfaces(
+def verified_regions(
     x: NDArray[np.float32] | None,
     y: NDArray[np.float32] | None,
     ordinate: NDArray[np.float32],
@@ -96,9 +96,10 @@ def verify_surfaces(
     noise: Sequence[float],
     noise_map: NDArray[np.float32] | None,
     edges: NDArray[np.uint8] | None,
-    labels: NDArray[np.int32],
     correlation: float,
     tolerance: float,
     share: float,
-    accepted: NDArray[np.uint8],
+    dilations: int,
+    min_area: int,
+    regions: NDArray[np.int32],
 ) -> None: ...
