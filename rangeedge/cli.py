@@ -386,7 +386,7 @@ def _bench(args: argparse.Namespace) -> int:
     options = _options(args)
     if args.image is None and options:
         given = " ".join("-K" if name == "K" else "--" + _kebab(name) for name in options)
-        raise error("bench", f"{given} describes an IMAGE, and none is given; the built-in scene brings its own geometry")
+        raise error("bench", f"{given} describes an IMAGE, but there is none; the built-in scene has its own")
     image = rendered_scene() if args.image is None else read_image(args.image, options)
     times = benchmark(image.src, repeat=args.repeat, **image.geometry)
     print(json.dumps(times, indent=2) if args.json else table(times))
