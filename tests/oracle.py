@@ -38,7 +38,7 @@ STRADDLING = 2.0  # how much more, in significance, a segment across an edge may
 LONE_SIGNIFICANCE = 3.0
 JUMP_TOLERANCES, JUMP_ALONE = 2.0, 12.0
 REACH, CAPPED, LONE_SHARE = 4.0, 8.0, 1 / 3  # pixels; standard deviations
-ALIGN_ROUNDS, LEAST_SLOPE = 2, 0.3
+LEAST_SLOPE = 0.3
 LEAST_SPREAD, LEAST_DIRECTIONS = 0.05, (0.02, 1e-9)
 SMALLEST = 1e-30
 
@@ -553,8 +553,7 @@ class Neighbourhood:
             return self.found
         joint = [replace(c, significance=self._joint_significance(c)) for c in self.found]
         kept = Neighbourhood([c for c in joint if c.significance >= params.minSignificance], self.image)
-        for _ in range(ALIGN_ROUNDS):
-            kept = Neighbourhood([kept._aligned(c) for c in kept.found], self.image)
+        kept = Neighbourhood([kept._aligned(c) for c in kept.found], self.image)
         return kept._with_normals() if params.crease == CREASE_NORMAL else kept.found
 
     def _common_line(self, c, share=1.0):

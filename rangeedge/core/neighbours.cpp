@@ -14,7 +14,6 @@ constexpr double degrees = 57.295779513082320877;
 constexpr float reach = 4;             // pixels; weights fall from 1 at the candidate itself to 0 there
 constexpr float capped = 8;            // a single candidate's share of the evidence
 constexpr float lone = 1 / 3.0f;       // what a candidate without neighbours is worth
-constexpr int align_rounds = 2;
 constexpr int kinds = jump_bit | convex_bit | concave_bit;
 
 struct Vector {
@@ -240,10 +239,9 @@ void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const 
     });
     const auto weak = [&](const Candidate& c) { return c.significance < least; };
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), weak), candidates.end());
-    for (int round = 0; round < align_rounds; ++round)
-        update([&](const Candidate& c, const Neighbours& near, Candidate& moved) {
-            align(c, near, image, parameters.max_shift, moved);
-        });
+    update([&](const Candidate& c, const Neighbours& near, Candidate& moved) {
+        align(c, near, image, parameters.max_shift, moved);
+    });
     if (!parameters.normals) return;
     update([&](const Candidate& c, const Neighbours& near, Candidate& measured) {
         const double angle = c.crease > 0 ? normal_angle(c, near, image.projective) : -1;
