@@ -49,7 +49,7 @@ def drawEdges(
 ) -> np.ndarray:
     """Draw edges over the shaded relief of a range image, or over a picture.
 
-    drawEdges(src, edges[, kind[, dst[, K[, heightMap]]]]) -> dst
+    drawEdges(src, edges[, kind[, dst]], *[, K[, heightMap]]) -> dst
 
     With `kind`: jump vermilion on the near side and purple on the far side, convex yellow, concave blue, beside no data
     grey, anything else white; a jump hides a crease. Without it every edge is white. Pixels without data are hatched.
@@ -104,7 +104,7 @@ def drawRegions(
 ) -> np.ndarray:
     """Draw every region in a colour of its own among its neighbours.
 
-    drawRegions(labels[, src[, alpha[, dst[, K[, heightMap]]]]]) -> dst
+    drawRegions(labels[, src[, alpha[, dst]]], *[, K[, heightMap]]) -> dst
 
     Nine colours are shared out so that regions next to each other, or across a gap without label, differ.
 
@@ -158,7 +158,7 @@ def colorizeDistance(
 ) -> np.ndarray:
     """Colour a distance map from black at the edges to pale yellow far from them.
 
-    colorizeDistance(distance[, dst[, maxDistance[, log]]]) -> dst
+    colorizeDistance(distance[, dst], *[, maxDistance[, log]]) -> dst
 
     The colour map is ``cv2.COLORMAP_INFERNO`` over distance / maxDistance, or over
     log(1 + distance) / log(1 + maxDistance), which brings out the neighbourhood of edges. Infinite distances,
@@ -215,7 +215,7 @@ def drawOverview(
 ) -> np.ndarray:
     """Show a range image and what was found in it in one labelled picture.
 
-    drawOverview(src, strength, edges[, distance[, title[, jumpCut[, creaseCut[, K[, heightMap]]]]]]) -> retval
+    drawOverview(src, strength, edges[, distance], *[, title[, jumpCut[, creaseCut[, K[, heightMap]]]]]) -> retval
 
     The panels: shaded relief, strength of jump and of crease, the kinds of all candidates, the selected edges over
     the relief, and the distance map; below them the key to the colours.

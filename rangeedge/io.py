@@ -36,7 +36,7 @@ class RangeImage(NamedTuple):
 def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None) -> RangeImage:
     """Read a range image and what its file says about its geometry.
 
-    imreadRange(path[, calibration]) -> image
+    imreadRange(path, *[, calibration]) -> image
 
     The content of the file decides on the format:
 
@@ -116,7 +116,7 @@ def imwriteRange(
 ) -> bool:
     """Write a range image, and into NPZ its geometry; `imreadRange` returns the same.
 
-    imwriteRange(path, src[, K[, pixelSize[, heightMap[, depthFactor]]]]) -> retval
+    imwriteRange(path, src, *[, K[, pixelSize[, heightMap[, depthFactor]]]]) -> retval
 
     The suffix decides on the format:
 

@@ -312,7 +312,7 @@ def measureDetector(
 ) -> np.ndarray:
     """The error E of `edgeStrength` itself, on a rendered image of every pair of planes.
 
-    measureDetector(normals1, normals2[, sigma[, crease[, size[, seed]]]]) -> errors
+    measureDetector(normals1, normals2[, sigma[, crease]], *[, size[, seed]]) -> errors
 
     Each pair is drawn by parallel projection on a grid of unit pitch, in turn as a convex and a concave edge through
     a random point within an eighth of `size` of the image centre. The strength is the median along the quarter of the

@@ -172,7 +172,7 @@ def triangulationNoise(
 ) -> Scan:
     """A quiet laser triangulation scanner: little white noise, and no data where the laser casts a shadow.
 
-    triangulationNoise(rendering[, sigma[, seed[, light]]]) -> scan
+    triangulationNoise(rendering[, sigma[, seed]], *[, light]) -> scan
 
     Parameters
     ----------
@@ -272,7 +272,7 @@ def kinectNoise(
 ) -> Scan:
     """A Kinect v1: noise in inverse depth, correlated between pixels; ragged edges, shadows, holes; whole millimetres.
 
-    kinectNoise(rendering[, sigma[, seed[, jitter[, holes]]]]) -> scan
+    kinectNoise(rendering[, sigma[, seed]], *[, jitter[, holes]]) -> scan
 
     The disparity f b / z (b = 75 mm) is disturbed, rounded to 1/8 pixel and turned back into depth, so that noise and
     resolution grow with z^2 (Khoshelham and Oude Elberink, 2012: 1.4 mm and 2.9 mm at 1 m). `src` is uint16, 0 is no
