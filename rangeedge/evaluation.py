@@ -178,7 +178,7 @@ def evaluateEdges(
 ) -> EdgeScores:
     """Compare an edge map with typed ground truth.
 
-    evaluateEdges(edges, truth, *[, tolerance[, ignore[, kind[, crease, creaseTruth[, jump, jumpTruth]]]]]) -> EdgeScores
+    evaluateEdges(edges, truth, *[, tolerance[, ignore[, kind[, crease, creaseTruth[, jump, jumpTruth]]]]]) -> scores
 
     Both maps are thinned to skeletons first. With t the tolerance and all distances Euclidean,
 
@@ -383,7 +383,7 @@ def hooverScores(
 ) -> HooverScores:
     """Score a segmentation against true regions after Hoover et al.
 
-    hooverScores(labels, truth, *[, T[, ignore]]) -> HooverScores
+    hooverScores(labels, truth, *[, T[, ignore]]) -> scores
 
     With |m & n| the overlap of region m of the segmentation and true region n,
 
