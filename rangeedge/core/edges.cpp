@@ -146,7 +146,7 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
         std::vector<Candidate> found;
     };
     std::vector<Strip> strips;
-    for (int direction = 1; direction <= 8; direction *= 2) {
+    for (const int direction : {rows_bit, cols_bit, diag45_bit, diag135_bit}) {
         const int lines = parameters.directions & direction ? line_count(direction, image.rows, image.cols) : 0;
         for (int first = 0; first < lines; first += strip_lines)
             strips.push_back({direction, first, std::min(strip_lines, lines - first), {}});

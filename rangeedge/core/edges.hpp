@@ -47,6 +47,9 @@ struct Parameters {
     int threads;
 };
 
+// Bits of Parameters::directions, one of which is Candidate::direction.
+enum Direction : std::uint8_t { rows_bit = 1, cols_bit = 2, diag45_bit = 4, diag135_bit = 8 };
+
 // Bits of Candidate::kind.
 enum Kind : std::uint8_t {
     jump_bit = 1,

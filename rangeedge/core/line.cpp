@@ -6,8 +6,6 @@
 namespace rangeedge {
 namespace {
 
-enum Direction { rows_bit = 1, cols_bit = 2, diag45_bit = 4 };
-
 template <class T>
 constexpr T nan = std::numeric_limits<T>::quiet_NaN();
 
@@ -162,14 +160,14 @@ void LineReader<T>::read_points(Line<T>& line) const {
     Vector normal = image_.projective ? cross(a, b) : cross(axis, combination(b, -1, a));
     if (!normalise(normal)) return;
     Vector away = combination(axis, -dot(axis, normal), normal);  // the axis within the plane
-    line.kappa = std::sqrt(dot(away, away));  // of the axis along `away`, the inverse until below
+    const double foreshortened = std::sqrt(dot(away, away));
     if (!normalise(away)) return;
+    line.kappa = 1 / foreshortened;
     // Across the viewing direction, the way the samples run.
     Vector along = cross(normal, away);
     const double turn = image_.projective ? dot(b, along) * dot(a, away) - dot(a, along) * dot(b, away)
                                           : dot(combination(b, -1, a), along);
     if (turn < 0) along = {-along.x, -along.y, -along.z};
-    line.kappa = 1 / line.kappa;
     for (int k = first; k <= last; ++k) {
         const Vector p = point(k);
         if (!valid(p)) continue;

@@ -172,7 +172,7 @@ struct Step {
     int dcol, drow;
 };
 Step step_of(const Candidate& c) {
-    return {c.direction == 2 ? 0 : 1, c.direction == 1 ? 0 : c.direction == 4 ? -1 : 1};
+    return {c.direction == cols_bit ? 0 : 1, c.direction == rows_bit ? 0 : c.direction == diag45_bit ? -1 : 1};
 }
 
 // Moves a crease along its scan line onto the line it has in common with its neighbours, unless that leads off the data.
