@@ -12,207 +12,202 @@ namespace {
 
 constexpr double curved_significance = 5;  // of the quadratic term of a least-squares fit
 constexpr double straddling = 2;           // how much more, in significance, a segment across an edge may cost
+constexpr int none = -1;
 
-// Adds the ordinates of n samples one unit apart, the first at abscissa t: eight at a time, then lane by lane.
-RANGEEDGE_WIDE
-void add_ordinates(const float* y, int n, int t, Moments& m) {
-    Double4 s0[2] = {}, s1[2] = {}, s2[2] = {}, sq[2] = {};
-    Double4 at[2];
-    for (int i = 0; i < 4; ++i) at[0][i] = t + i, at[1][i] = t + i + 4;
-    int k = 0;
-    for (; k + 8 <= n; k += 8)
-        for (int half = 0; half < 2; ++half) {
-            Float4 value;
-            std::memcpy(&value, y + k + 4 * half, sizeof value);
-            const Double4 h = __builtin_convertvector(value, Double4) - m.base, ht = h * at[half];
-            s0[half] += h;
-            s1[half] += ht;
-            s2[half] += ht * at[half];
-            sq[half] += h * h;
-            at[half] += 8.0;
-        }
-    for (int half = 0; half < 2; ++half)
-        for (int i = 0; i < 4; ++i) m.y0 += s0[half][i], m.y1 += s1[half][i], m.y2 += s2[half][i], m.yy += sq[half][i];
-    for (; k < n; ++k) {
-        const double h = static_cast<double>(y[k]) - m.base, x = t + k;
-        m.y0 += h, m.y1 += h * x, m.y2 += h * x * x, m.yy += h * h;
-    }
-}
+// Sums of n >= 1 samples one unit apart, h = y - base, t counted from the first one.
+struct Sums {
+    double h, ht, htt, hh;
+};
 
 template <class T>
-class Approximator {
+Sums sums_of(const T* y, int n, double base) {
+    Sums s{};
+    for (int k = 0; k < n; ++k) {
+        const double h = static_cast<double>(y[k]) - base, ht = h * k;
+        s.h += h, s.ht += ht, s.htt += ht * k, s.hh += h * h;
+    }
+    return s;
+}
+
+// Eight at a time, and those that are left in the same lanes.
+template <int bytes>
+RANGEEDGE_INLINE Sums sums_of_in(const float* y, int n, double base) {
+    using D = Doubles<bytes>;
+    const D bases = D::all(base), step = D::all(D::count);
+    D h0 = D::all(0), h1 = h0, h2 = h0, hh = h0, t = D::from(0);
+    float rest[D::count];
+    for (int k = 0; k < n; k += D::count) {
+        const float* values = y + k;
+        if (k + D::count > n) {
+            for (int i = 0; i < D::count; ++i) rest[i] = k + i < n ? values[i] : static_cast<float>(base);
+            values = rest;
+        }
+        const D h = load_doubles<bytes>(values) - bases, ht = h * t;
+        h0 += h, h1 += ht, h2 += ht * t, hh += h * h;
+        t += step;
+    }
+    return {h0.sum(), h1.sum(), h2.sum(), hh.sum()};
+}
+RANGEEDGE_VERSIONS(Sums, sums_of, (const float* y, int n, double base), (y, n, base))
+
+template <class T>
+Projections projections_of(const T* y, int n) {
+    // The base is one of the samples, and a number of their type.
+    const double base = static_cast<double>(y[n / 2]), centre = (n - 1) / 2.0;
+    const Sums s = sums_of(y, n, base);
+    Projections p;
+    p.n = n;
+    const double mean = s.h / n;
+    p.mean = base + mean;
+    p.squares = std::max(0.0, s.hh - s.h * mean);
+    p.y1 = s.ht - centre * s.h;
+    p.y2 = s.htt - 2 * centre * s.ht + (centre * centre - Projections::beta(n)) * s.h;
+    return p;
+}
+
+// Joins the segments of one line.
+template <class T, class Sums>
+class Joiner {
 public:
-    Approximator(const Line<T>& line, const Parameters& parameters, Approximation& result)
-        : line_(line), parameters_(parameters), r_(result) {}
+    Joiner(const Line<T>& line, const Parameters& parameters, std::vector<Piece<Sums>>& pieces, std::vector<Join>& cheap)
+        : line_(line), limit_(parameters.merge_significance * parameters.merge_significance), pieces_(pieces),
+          cheap_(cheap) {}
 
-    void split() {
-        const T* x = line_.irregular ? line_.x.data() : nullptr;
-        const T* scale = line_.scaled ? line_.scale.data() : nullptr;
-        r_.segments.clear();
-        for_each_run(line_.y.data(), x, line_.path.size, [&](int first, int last) {
-            split_run(Run<T>{line_.y.data(), x, scale, first, last}, static_cast<T>(line_.tolerance), r_.pending,
-                      r_.segments);
-        });
+    void add(const Segment& s) {
+        const int i = static_cast<int>(pieces_.size());
+        const Sums sums = sums_over(s);
+        pieces_.push_back({s, i - 1, i + 1, sums, least(s), residual_squares(sums, least(s)), HUGE_VAL});
     }
 
-    void interpolate() {
-        r_.curves.clear();
-        for (const Segment& s : r_.segments) {
-            const int middle = s.first + (s.last - s.first) / 2;
-            Moments moments = empty_moments(middle);
-            int added = s.first - 1;
-            for (const int k : {s.first, middle, s.last}) {
-                if (k > added) add(moments, k);
-                added = k;
-            }
-            r_.curves.push_back(fit_interpolating(moments));
-        }
-    }
-
-    void fit() {
-        r_.curves.clear();
-        r_.moments.clear();
-        for (const Segment& s : r_.segments) {
-            r_.moments.push_back(moments_of(s));
-            r_.curves.push_back(fit_least_squares(r_.moments.back(), sigma(s), curved_significance));
-        }
-    }
-
-    // Joins segments; they form a linked list meanwhile, of which the first one stays.
     void join() {
-        const int count = static_cast<int>(r_.segments.size());
-        r_.previous.resize(r_.segments.size());
-        r_.next.resize(r_.segments.size());
-        for (int i = 0; i < count; ++i) previous(i) = i - 1, next(i) = i + 1 < count ? i + 1 : none;
+        const auto count = pieces_.size();
+        if (count > 0) pieces_.back().next = none;
+        if (!(limit_ > 0)) return;
         if (count > 1) merge();
         if (count > 2) dissolve();
-        std::size_t kept = 0;
-        for (int i = count > 0 ? 0 : none; i != none; i = next(i), ++kept) {
-            r_.segments[kept] = segment(i);
-            r_.curves[kept] = curve(i);
+    }
+
+    void take(Approximation& result) const {
+        for (int i = pieces_.empty() ? none : 0; i != none; i = at(i).next) {
+            result.segments.push_back(at(i).segment);
+            result.curves.push_back(curve(i));
         }
-        r_.segments.resize(kept);
-        r_.curves.resize(kept);
     }
 
 private:
-    static constexpr int none = -1;
-    int& previous(int i) { return r_.previous[static_cast<std::size_t>(i)]; }
-    int& next(int i) { return r_.next[static_cast<std::size_t>(i)]; }
-    Segment& segment(int i) { return r_.segments[static_cast<std::size_t>(i)]; }
-    Curve& curve(int i) { return r_.curves[static_cast<std::size_t>(i)]; }
-    Moments& moments(int i) { return r_.moments[static_cast<std::size_t>(i)]; }
-    double& cost(int i) { return r_.costs[static_cast<std::size_t>(i)]; }
+    Piece<Sums>& at(int i) { return pieces_[static_cast<std::size_t>(i)]; }
+    const Piece<Sums>& at(int i) const { return pieces_[static_cast<std::size_t>(i)]; }
 
     void remove(int i) {
-        next(previous(i)) = next(i);
-        if (next(i) != none) previous(next(i)) = previous(i);
+        at(at(i).previous).next = at(i).next;
+        if (at(i).next != none) at(at(i).next).previous = at(i).previous;
     }
 
     // Takes back cuts, the least significant first, until each one left lowers the sum of squares enough.
     void merge() {
-        r_.costs.resize(r_.segments.size());
-        for (int i = 0; i != none; i = next(i)) price(i);
-        while (!r_.cheap.empty()) {
-            const Join join = r_.cheap.front();
-            std::pop_heap(r_.cheap.begin(), r_.cheap.end());
-            r_.cheap.pop_back();
-            const int i = join.left, right = next(i);
-            if (cost(i) != join.cost) continue;  // it has changed since
-            moments(i) = joined(moments(i), moments(right));
-            segment(i).last = segment(right).last;
-            curve(i) = fit_least_squares(moments(i), sigma(segment(i)), curved_significance);
-            cost(right) = HUGE_VAL;
-            remove(right);
-            price(i);
-            if (previous(i) != none) price(previous(i));
+        for (int i = 0; i != none; i = at(i).next) price(i);
+        while (!cheap_.empty()) {
+            const Join cheapest = cheap_.front();
+            std::pop_heap(cheap_.begin(), cheap_.end());
+            cheap_.pop_back();
+            Piece<Sums>& piece = at(cheapest.left);
+            if (piece.cost != cheapest.cost) continue;  // it has changed since
+            Piece<Sums>& right = at(piece.next);
+            piece.sums = joined(piece.sums, right.sums);
+            piece.segment.last = right.segment.last;
+            piece.least = least(piece.segment);
+            piece.squares = residual_squares(piece.sums, piece.least);
+            right.cost = HUGE_VAL;
+            remove(piece.next);
+            price(cheapest.left);
+            if (piece.previous != none) price(piece.previous);
         }
     }
 
     void price(int i) {
-        const double limit = parameters_.merge_significance * parameters_.merge_significance;
-        cost(i) = cost_of_merging(i);
-        if (!(cost(i) < limit)) return;
-        r_.cheap.push_back({cost(i), i});
-        std::push_heap(r_.cheap.begin(), r_.cheap.end());
+        Piece<Sums>& piece = at(i);
+        piece.cost = cost_of_merging(piece);
+        if (!(piece.cost < limit_)) return;
+        cheap_.push_back({piece.cost, i});
+        std::push_heap(cheap_.begin(), cheap_.end());
+    }
+
+    double cost_of_merging(const Piece<Sums>& piece) const {
+        if (piece.next == none) return HUGE_VAL;
+        const Piece<Sums>& right = at(piece.next);
+        if (!adjacent(piece, right)) return HUGE_VAL;
+        const double sigma = line_.sigma_at(piece.segment.last);
+        const double one = residual_squares(joined(piece.sums, right.sums), curved_significance * sigma);
+        return (one - piece.squares - right.squares) / (sigma * sigma);
     }
 
     // Splitting may leave a segment across an edge, its rounding included, where one cut would do. It is taken out
     // where the curves beside it meet within it and, given its samples, explain them nearly as well.
     void dissolve() {
-        for (int i = next(0); i != none && next(i) != none;) {
-            const int before = previous(i), after = next(i);
-            i = !dissolved(i) || previous(before) == none ? after : before;
+        for (int i = at(0).next; i != none && at(i).next != none;) {
+            const int before = at(i).previous, after = at(i).next;
+            i = !dissolved(i) || at(before).previous == none ? after : before;
         }
-    }
-
-    Moments empty_moments(int k) const {
-        Moments moments;
-        moments.origin = line_.abscissa(k);
-        moments.base = line_.ordinate(k);
-        return moments;
-    }
-    void add(Moments& moments, int k) const { moments.add(line_.abscissa(k), line_.ordinate(k)); }
-
-    Moments moments_of(const Segment& s) const {
-        const int middle = s.first + (s.last - s.first) / 2;
-        Moments moments = empty_moments(middle);
-        if constexpr (std::is_same_v<T, float>) {
-            if (!line_.irregular) {
-                moments.count(middle - s.first, s.last - middle);
-                add_ordinates(line_.y.data() + s.first, s.size(), s.first - middle, moments);
-                return moments;
-            }
-        }
-        for (int k = s.first; k <= s.last; ++k) add(moments, k);
-        return moments;
-    }
-
-    double sigma(const Segment& s) const { return line_.sigma_at(s.first + s.size() / 2); }
-
-    bool adjacent(int i) {
-        const int last = segment(i).last;
-        return last + 1 == segment(next(i)).first && line_.abscissa(last) < line_.abscissa(last + 1);
-    }
-
-    double cost_of_merging(int i) {
-        if (next(i) == none || !adjacent(i)) return HUGE_VAL;
-        const double s = line_.sigma_at(segment(i).last);
-        const Curve one = fit_least_squares(joined(moments(i), moments(next(i))), s, curved_significance);
-        return (one.sum_squares - curve(i).sum_squares - curve(next(i)).sum_squares) / (s * s);
     }
 
     bool dissolved(int i) {
-        const int before = previous(i), after = next(i);
-        if (!adjacent(before) || !adjacent(i)) return false;
-        const Segment s = segment(i);
-        const Curve &f = curve(before), &g = curve(after);
+        const Segment s = at(i).segment;
+        Piece<Sums>&before = at(at(i).previous), &after = at(at(i).next);
+        if (!adjacent(before, at(i)) || !adjacent(at(i), after)) return false;
         double x = 0;
-        if (!intersection(f, g, (line_.abscissa(s.first) + line_.abscissa(s.last)) / 2, x)) return false;
+        const double middle = (line_.abscissa(s.first) + line_.abscissa(s.last)) / 2;
+        if (!intersection(curve(at(i).previous), curve(at(i).next), middle, x)) return false;
         if (x < line_.abscissa(s.first - 1) || x > line_.abscissa(s.last + 1)) return false;
         int cut = s.first - 1;
-        Moments left = moments(before), right = moments(after);
-        for (int k = s.first; k <= s.last; ++k) {
-            if (line_.abscissa(k) <= x) cut = k;
-            add(k == cut ? left : right, k);
-        }
-        const double v = sigma(s);
-        const Curve to_cut = fit_least_squares(left, v, curved_significance);
-        const Curve from_cut = fit_least_squares(right, v, curved_significance);
-        const double sum = f.sum_squares + curve(i).sum_squares + g.sum_squares;
-        const double limit = straddling * parameters_.merge_significance * v;
-        if (!(to_cut.sum_squares + from_cut.sum_squares - sum < limit * limit)) return false;
-        segment(before).last = cut;
-        segment(after).first = cut + 1;
-        moments(before) = left, moments(after) = right;
-        curve(before) = to_cut, curve(after) = from_cut;
+        while (cut < s.last && line_.abscissa(cut + 1) <= x) ++cut;
+        Sums left = before.sums, right = after.sums;
+        if (cut >= s.first) left = joined(left, sums_over({s.first, cut}));
+        if (cut < s.last) right = joined(sums_over({cut + 1, s.last}), right);
+        const double sigma = sigma_of(s), least = curved_significance * sigma;
+        const double to_cut = residual_squares(left, least), from_cut = residual_squares(right, least);
+        const double cost = to_cut + from_cut - (before.squares + at(i).squares + after.squares);
+        if (!(cost < straddling * straddling * limit_ * sigma * sigma)) return false;
+        before.segment.last = cut;
+        after.segment.first = cut + 1;
+        before.sums = left, after.sums = right;
+        before.least = after.least = least;
+        before.squares = to_cut, after.squares = from_cut;
         remove(i);
         return true;
     }
 
+    bool adjacent(const Piece<Sums>& left, const Piece<Sums>& right) const {
+        const int last = left.segment.last;
+        return last + 1 == right.segment.first && line_.abscissa(last) < line_.abscissa(last + 1);
+    }
+
+    Sums sums_over(const Segment& s) const {
+        if constexpr (std::is_same_v<Sums, Projections>) {
+            return projections_of(line_.y + s.first, s.size());
+        } else {
+            Moments moments;
+            moments.origin = line_.abscissa(s.first + (s.last - s.first) / 2);
+            moments.base = line_.ordinate(s.first + (s.last - s.first) / 2);
+            for (int k = s.first; k <= s.last; ++k) moments.add(line_.abscissa(k), line_.ordinate(k));
+            return moments;
+        }
+    }
+
+    Curve curve(int i) const {
+        const Piece<Sums>& piece = at(i);
+        if constexpr (std::is_same_v<Sums, Projections>)
+            return fit_least_squares(piece.sums, piece.segment.first, piece.least);
+        else
+            return fit_least_squares(piece.sums, piece.least);
+    }
+
+    double sigma_of(const Segment& s) const { return line_.sigma_at(s.first + s.size() / 2); }
+    double least(const Segment& s) const { return curved_significance * sigma_of(s); }
+
     const Line<T>& line_;
-    const Parameters& parameters_;
-    Approximation& r_;
+    double limit_;
+    std::vector<Piece<Sums>>& pieces_;
+    std::vector<Join>& cheap_;
 };
 
 }  // namespace
@@ -229,18 +224,55 @@ bool intersection(const Curve& f, const Curve& g, double near, double& x) {
 }
 
 template <class T>
-void approximate(const Line<T>& line, const Parameters& parameters, Approximation& result) {
-    Approximator<T> approximator(line, parameters, result);
-    approximator.split();
-    if (parameters.interpolate) {
-        approximator.interpolate();
-        return;
-    }
-    approximator.fit();
-    if (parameters.merge_significance > 0) approximator.join();
+const Approximation& Approximator<T>::approximate(const Line<T>& line) {
+    result_.segments.clear();
+    result_.curves.clear();
+    split(line);
+    if (parameters_.interpolate)
+        interpolate(line);
+    else if (line.x)
+        fit(line, uneven_);
+    else
+        fit(line, even_);
+    return result_;
 }
 
-template void approximate(const Line<float>&, const Parameters&, Approximation&);
-template void approximate(const Line<double>&, const Parameters&, Approximation&);
+template <class T>
+void Approximator<T>::split(const Line<T>& line) {
+    for_each_run(line.y, line.x, line.path.size, [&](int first, int last) {
+        split_run(Run<T>{line.y, line.x, line.scale, first, last}, static_cast<T>(line.tolerance), pending_,
+                  result_.segments);
+    });
+}
+
+template <class T>
+void Approximator<T>::interpolate(const Line<T>& line) {
+    for (const Segment& s : result_.segments) {
+        const int middle = s.first + (s.last - s.first) / 2;
+        Moments moments;
+        moments.origin = line.abscissa(middle);
+        moments.base = line.ordinate(middle);
+        int added = s.first - 1;
+        for (const int k : {s.first, middle, s.last}) {
+            if (k > added) moments.add(line.abscissa(k), line.ordinate(k));
+            added = k;
+        }
+        result_.curves.push_back(fit_interpolating(moments));
+    }
+}
+
+template <class T>
+template <class Sums>
+void Approximator<T>::fit(const Line<T>& line, std::vector<Piece<Sums>>& pieces) {
+    pieces.clear();
+    Joiner<T, Sums> joiner(line, parameters_, pieces, cheap_);
+    for (const Segment& s : result_.segments) joiner.add(s);
+    joiner.join();
+    result_.segments.clear();
+    joiner.take(result_);
+}
+
+template class Approximator<float>;
+template class Approximator<double>;
 
 }  // namespace rangeedge

@@ -9,6 +9,22 @@
 
 namespace rangeedge {
 
+struct Approximation {
+    std::vector<Segment> segments;
+    std::vector<Curve> curves;
+};
+
+// A segment while segments are joined: a linked list, of which the first one stays.
+template <class Sums>
+struct Piece {
+    Segment segment;
+    int previous, next;
+    Sums sums;
+    double least;    // significance of a quadratic term, in the unit of the ordinates
+    double squares;  // of the residuals
+    double cost;     // of taking back the cut on the right
+};
+
 // A segment that may be joined with the next one, and what that costs.
 struct Join {
     double cost;
@@ -17,21 +33,29 @@ struct Join {
     bool operator<(const Join& other) const { return cost != other.cost ? cost > other.cost : left > other.left; }
 };
 
-// The approximation of one line, and the scratch that making it needs; reused from line to line.
-struct Approximation {
-    std::vector<Segment> segments;
-    std::vector<Curve> curves;
-    std::vector<Moments> moments;
-    std::vector<Segment> pending;
-    std::vector<int> previous, next;  // of each segment while segments are joined
-    std::vector<double> costs;        // of taking back the cut on the right
-    std::vector<Join> cheap;
-};
-
-// Splits the line (section 4.1), fits a curve to every segment (4.2, end), takes back cuts that the noise explains,
-// and gives segments that lie across an edge to the surfaces beside it.
+// Approximates line after line; what it needs for that is reused.
 template <class T>
-void approximate(const Line<T>& line, const Parameters& parameters, Approximation& result);
+class Approximator {
+public:
+    explicit Approximator(const Parameters& parameters) : parameters_(parameters) {}
+
+    // Splits the line (section 4.1), fits a curve to every segment (4.2, end), takes back cuts that the noise
+    // explains, and gives segments that lie across an edge to the surfaces beside it. Holds until the next call.
+    const Approximation& approximate(const Line<T>& line);
+
+private:
+    void split(const Line<T>& line);
+    void interpolate(const Line<T>& line);
+    template <class Sums>
+    void fit(const Line<T>& line, std::vector<Piece<Sums>>& pieces);
+
+    Parameters parameters_;
+    Approximation result_;
+    std::vector<Segment> pending_;
+    std::vector<Piece<Projections>> even_;  // of samples one unit apart
+    std::vector<Piece<Moments>> uneven_;
+    std::vector<Join> cheap_;
+};
 
 // Where f and g meet, the place nearest `near`; false where they do not.
 bool intersection(const Curve& f, const Curve& g, double near, double& x);

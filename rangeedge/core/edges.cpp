@@ -19,8 +19,6 @@ constexpr double lone_significance = 3;  // of a candidate by itself, before its
 constexpr double jump_alone = 12;        // significance of a jump
 constexpr double jump_tolerances = 2;    // what tells a jump from the approximation's own error
 
-constexpr int strip_lines = 16;  // read together: samples of a cache line
-
 // Where an edge is: between two samples, at an abscissa, also counted in samples.
 struct Cut {
     int before, after;
@@ -35,10 +33,10 @@ public:
     LineDetector(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters, int direction)
         : cols_(image.cols), parameters_(parameters), reader_(image, noise, parameters), direction_(direction) {}
 
-    void read(int first, std::vector<Line<T>>& lines) const { reader_.read(direction_, first, lines); }
+    void read(int first, int count, Strip<T>& strip) const { reader_.read(direction_, first, count, strip); }
 
-    void detect(const Line<T>& line, Approximation& a, std::vector<Candidate>& candidates) const {
-        approximate(line, parameters_, a);  // P 4.1
+    void detect(const Line<T>& line, Approximator<T>& approximator, std::vector<Candidate>& candidates) const {
+        const Approximation& a = approximator.approximate(line);  // P 4.1
         for (std::size_t i = 0; i + 1 < a.segments.size(); ++i) {
             if (a.segments[i + 1].first - a.segments[i].last - 1 > parameters_.max_gap) continue;
             const Cut cut = adapted_position(line, a, i);                                    // P 4.2, Fig. 5
@@ -141,31 +139,30 @@ private:
 template <class T>
 std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters) {
     // Neighbouring lines of one direction. Any thread may take any strip: they are many, and what they cost differs.
-    struct Strip {
+    struct Part {
         int direction, first, count;
         std::vector<Candidate> found;
     };
-    std::vector<Strip> strips;
+    std::vector<Part> parts;
     for (const int direction : {rows_bit, cols_bit, diag45_bit, diag135_bit}) {
         const int lines = parameters.directions & direction ? line_count(direction, image.rows, image.cols) : 0;
         for (int first = 0; first < lines; first += strip_lines)
-            strips.push_back({direction, first, std::min(strip_lines, lines - first), {}});
+            parts.push_back({direction, first, std::min(strip_lines, lines - first), {}});
     }
     std::atomic<std::size_t> taken{0};
     const int threads = std::max(1, parameters.threads);
     parallel_for(threads, threads, [&](int, int, int) {
-        std::vector<Line<T>> lines;
-        Approximation approximation;
-        for (std::size_t i; (i = taken++) < strips.size();) {
-            Strip& strip = strips[i];
-            const LineDetector<T> detector(image, noise, parameters, strip.direction);
-            lines.resize(static_cast<std::size_t>(strip.count));
-            detector.read(strip.first, lines);
-            for (const Line<T>& line : lines) detector.detect(line, approximation, strip.found);
+        Strip<T> strip;
+        Approximator<T> approximator(parameters);
+        for (std::size_t i; (i = taken++) < parts.size();) {
+            Part& part = parts[i];
+            const LineDetector<T> detector(image, noise, parameters, part.direction);
+            detector.read(part.first, part.count, strip);
+            for (const Line<T>& line : strip.lines) detector.detect(line, approximator, part.found);
         }
     });
     std::vector<Candidate> candidates;
-    for (const Strip& strip : strips) candidates.insert(candidates.end(), strip.found.begin(), strip.found.end());
+    for (const Part& part : parts) candidates.insert(candidates.end(), part.found.begin(), part.found.end());
     pool(candidates, image, parameters);
     return candidates;
 }

@@ -51,11 +51,28 @@ Curve with_quadratic(const LineAndRest& fit) {
 
 }  // namespace
 
-Curve fit_least_squares(const Moments& moments, double sigma, double significance) {
+Curve fit_least_squares(const Moments& moments, double least) {
     const LineAndRest fit = fit_line(moments);
-    // |c2| > k sigma / sqrt(norm2); three samples fix a quadratic, but nothing then tells noise from curvature.
-    const bool curved = moments.n > 3 && std::abs(fit.c2) * std::sqrt(fit.norm2) > significance * sigma;
+    const bool curved = moments.n > 3 && std::abs(fit.c2) * std::sqrt(fit.norm2) > least;
     return curved ? with_quadratic(fit) : fit.line;
+}
+
+Curve fit_least_squares(const Projections& p, double first, double least) {
+    Curve curve;
+    curve.base = p.mean;
+    curve.mean = first + (p.n - 1) / 2;
+    curve.n = p.n;
+    curve.sum_squares = residual_squares(p, least);
+    if (p.n > 1) {
+        curve.norm1 = Projections::norm1(p.n);
+        curve.c1 = p.y1 / curve.norm1;
+    }
+    if (p.n > 3 && p.gain() > least * least) {
+        curve.beta = Projections::beta(p.n);
+        curve.norm2 = Projections::norm2(p.n);
+        curve.c2 = p.y2 / curve.norm2;
+    }
+    return curve;
 }
 
 Curve fit_interpolating(const Moments& moments) {

@@ -1,6 +1,7 @@
 // The curve of a segment (paper, end of section 4.2): a least-squares line or quadratic with its covariance.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <cmath>
 
 namespace rangeedge {
@@ -16,17 +17,6 @@ struct Moments {
         n += 1;
         x1 += t, x2 += t2, x3 += t * t2, x4 += t2 * t2;
         y0 += h, y1 += h * t, y2 += h * t2, yy += h * h;
-    }
-    // Sets the sums of x for samples one unit apart, from -left to right.
-    void count(int left, int right) {
-        const auto sum1 = [](double k) { return k * (k + 1) / 2; };
-        const auto sum2 = [](double k) { return k * (k + 1) * (2 * k + 1) / 6; };
-        const auto sum4 = [&](double k) { return sum2(k) * (3 * k * k + 3 * k - 1) / 5; };
-        n = left + right + 1;
-        x1 = sum1(right) - sum1(left);
-        x2 = sum2(right) + sum2(left);
-        x3 = sum1(right) * sum1(right) - sum1(left) * sum1(left);
-        x4 = sum4(right) + sum4(left);
     }
     // The same sums, counted from another origin.
     Moments moved(double to) const {
@@ -61,7 +51,7 @@ struct Moments {
     }
 };
 
-// The sums over both segments, counted from their common mean.
+// The sums over both segments, the second one next to the first, counted from their common mean.
 inline Moments joined(const Moments& a, const Moments& b) {
     Moments sum = a;
     sum += b.rebased(a.base);
@@ -92,9 +82,43 @@ struct Curve {
     }
 };
 
-// Least squares. The quadratic term is kept only where it exceeds `significance` of its own standard deviations,
-// with samples of standard deviation `sigma`.
-Curve fit_least_squares(const Moments& moments, double sigma, double significance);
+// The same for samples one unit apart, whose polynomials depend on their number alone: p1 = x - mean and
+// p2 = p1^2 - (n^2 - 1) / 12. The ordinates are given by their mean and their products with p1 and p2.
+struct Projections {
+    double n = 0, mean = 0, y1 = 0, y2 = 0;
+    double squares = 0;  // of the distances from the mean
+
+    static double beta(double n) { return (n * n - 1) / 12; }
+    static double norm1(double n) { return n * beta(n); }
+    static double norm2(double n) { return norm1(n) * (n * n - 4) / 15; }
+    // By how much the quadratic term lowers the sum of squared residuals.
+    double gain() const { return y2 * y2 / norm2(n); }
+};
+
+inline Projections joined(const Projections& a, const Projections& b) {
+    const double n = a.n + b.n, step = b.mean - a.mean, product = a.n * b.n;
+    const double moved = product / n * step;  // a's sum of distances from the common mean, and less b's
+    Projections both;
+    both.n = n;
+    both.mean = a.mean + b.n / n * step;
+    both.squares = a.squares + b.squares + moved * step;
+    both.y1 = a.y1 + b.y1 + product / 2 * step;
+    both.y2 = a.y2 + b.y2 + a.n * b.y1 - b.n * a.y1 + moved * (a.n - b.n) * n / 6;
+    return both;
+}
+
+// Least squares. The quadratic term is kept only where it exceeds `least` of the standard deviations it has with
+// samples of unit variance. Three samples fix a quadratic, but nothing then tells noise from curvature.
+Curve fit_least_squares(const Moments& moments, double least);
+Curve fit_least_squares(const Projections& projections, double first, double least);  // `first`: the first abscissa
+
+// The sum of squared residuals of that curve.
+inline double residual_squares(const Moments& moments, double least) { return fit_least_squares(moments, least).sum_squares; }
+inline double residual_squares(const Projections& p, double least) {
+    const double line = p.n > 1 ? p.squares - p.y1 * p.y1 / Projections::norm1(p.n) : 0;
+    const double gain = p.n > 3 ? p.gain() : 0;
+    return std::max(0.0, line - (gain > least * least ? gain : 0));
+}
 
 // The quadratic, or line, or constant through the given samples (one to three of them).
 Curve fit_interpolating(const Moments& moments);

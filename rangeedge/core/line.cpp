@@ -2,6 +2,9 @@
 #include "line.hpp"
 
 #include <algorithm>
+#include <limits>
+
+#include "simd.hpp"
 
 namespace rangeedge {
 namespace {
@@ -10,7 +13,19 @@ template <class T>
 constexpr T nan = std::numeric_limits<T>::quiet_NaN();
 
 template <class T>
-constexpr T least = static_cast<T>(1e-30);  // no tolerance is finer
+T inverse(T tolerance) {
+    constexpr T least = static_cast<T>(1e-30);  // no tolerance is finer
+    return 1 / (tolerance > least ? tolerance : least);
+}
+
+// 1 / (c0 + c1 |y| + c2 y^2) of n ordinates.
+void inverse_polynomial(const double* y, int n, double c0, double c1, double c2, double* result) {
+    for (int k = 0; k < n; ++k) result[k] = inverse(c0 + (c1 + c2 * std::abs(y[k])) * std::abs(y[k]));
+}
+RANGEEDGE_WIDE
+void inverse_polynomial(const float* y, int n, float c0, float c1, float c2, float* result) {
+    for (int k = 0; k < n; ++k) result[k] = inverse(c0 + (c1 + c2 * std::abs(y[k])) * std::abs(y[k]));
+}
 
 struct Vector {
     double x, y, z;
@@ -47,47 +62,70 @@ Path line_path(int direction, int i, int rows, int cols) {
 }
 
 template <class T>
-void LineReader<T>::read(int direction, int first, std::vector<Line<T>>& lines) const {
-    const bool irregular = image_.points != nullptr;
-    for (std::size_t j = 0; j < lines.size(); ++j) {
-        Line<T>& line = lines[j];
-        line.path = line_path(direction, first + static_cast<int>(j), image_.rows, image_.cols);
+void LineReader<T>::read(int direction, int first, int count, Strip<T>& strip) const {
+    strip.lines.resize(static_cast<std::size_t>(count));
+    int longest = 0;
+    for (int j = 0; j < count; ++j) {
+        Line<T>& line = strip.lines[static_cast<std::size_t>(j)];
+        line = {};
+        line.path = line_path(direction, first + j, image_.rows, image_.cols);
         line.cols = image_.cols;
         line.projective = image_.projective;
-        line.irregular = irregular;
         line.noise = noise_;
-        line.y.resize(static_cast<std::size_t>(line.path.size));
-        if (irregular)
-            read_points(line);
-        else
-            place(line);
+        longest = std::max(longest, line.path.size);
     }
-    if (!irregular) gather(lines);
-    for (Line<T>& line : lines) set_tolerance(line);
+    const auto size = static_cast<std::size_t>(longest) * strip.lines.size();
+    std::size_t used = 0;
+    if (image_.points) {
+        strip.x.resize(size), strip.y.resize(size);
+        for (Line<T>& line : strip.lines) {
+            read_points(line, strip.x.data() + used, strip.y.data() + used);
+            used += static_cast<std::size_t>(line.path.size);
+        }
+    } else {
+        for (Line<T>& line : strip.lines) place(line);
+        if (direction == rows_bit)
+            for (Line<T>& line : strip.lines) line.y = image_.ordinate + line.path.pixel(0, image_.cols);
+        else
+            turn_rows(strip);
+    }
+    used = 0;
+    strip.scale.resize(size);
+    for (Line<T>& line : strip.lines) {
+        set_tolerance(line, strip.scale.data() + used);
+        used += static_cast<std::size_t>(line.path.size);
+    }
 }
 
-// A strip of some rows after the other, and in it line by line.
+// Copies the samples so that those of a line lie one after the other. A row of the image holds one sample of each
+// line, side by side; on diagonals they are a column farther right in the next row.
 template <class T>
-void LineReader<T>::gather(std::vector<Line<T>>& lines) const {
-    constexpr int strip = 16, ahead = 2 * strip;
-    for (int top = 0; top < image_.rows; top += strip)
-        for (Line<T>& line : lines) {
-            const Path& path = line.path;
-            const std::int64_t stride = static_cast<std::int64_t>(path.drow) * image_.cols + path.dcol;
-            int first = 0, last = path.size;  // of the samples within the strip
-            if (path.drow == 0) {
-                if (path.row < top || path.row >= top + strip) continue;
-            } else {
-                const int k = path.drow > 0 ? top - path.row : path.row - (top + strip - 1);
-                first = std::max(first, k), last = std::min(last, k + strip);
-            }
-            const T* source = image_.ordinate + path.pixel(0, image_.cols);
-            T* y = line.y.data();
-            for (int k = first; k < last; ++k) {
-                if (path.drow != 0) __builtin_prefetch(source + std::min(k + ahead, path.size - 1) * stride);
-                y[k] = source[k * stride];
-            }
+void LineReader<T>::turn_rows(Strip<T>& strip) const {
+    const Path& start = strip.lines.front().path;
+    const int count = static_cast<int>(strip.lines.size()), slant = start.dcol, down = start.drow;
+    // The first row that any of the lines has, and the column of line 0 there, which may lie outside of the image.
+    int top = start.row;
+    for (const Line<T>& line : strip.lines) top = down > 0 ? std::min(top, line.path.row) : std::max(top, line.path.row);
+    const int left = start.col - slant * (start.row - top) * down;
+    const int height = std::min(down > 0 ? image_.rows - top : top + 1, slant ? image_.cols - left : image_.rows);
+    // Next samples of all lines lie in different sets of any cache.
+    const int pitch = (height + 1023) / 1024 * 1024 + 16;
+    strip.y.resize(static_cast<std::size_t>(pitch) * strip.lines.size());
+    for (int k = 0; k < height; ++k) {
+        const int col = left + slant * k;
+        const auto source = static_cast<std::int64_t>(top + down * k) * image_.cols + col;
+        T* turned = strip.y.data() + k;
+        if (count == strip_lines && col >= 0 && col + strip_lines <= image_.cols) {
+            for (int j = 0; j < strip_lines; ++j) turned[j * pitch] = image_.ordinate[source + j];
+        } else {
+            const int end = std::min(count, image_.cols - col);
+            for (int j = std::max(0, -col); j < end; ++j) turned[j * pitch] = image_.ordinate[source + j];
         }
+    }
+    for (int j = 0; j < count; ++j) {
+        Line<T>& line = strip.lines[static_cast<std::size_t>(j)];
+        line.y = strip.y.data() + static_cast<std::ptrdiff_t>(j) * pitch + (line.path.row - top) * down;
+    }
 }
 
 template <class T>
@@ -105,51 +143,45 @@ void LineReader<T>::place(Line<T>& line) const {
 }
 
 template <class T>
-void LineReader<T>::set_tolerance(Line<T>& line) const {
+void LineReader<T>::set_tolerance(Line<T>& line, T* scale) const {
     const Noise& n = noise_.noise;
     const bool given = parameters_.eps > 0;
-    // One tolerance for the whole line: a length on a grid, or a noise that does not change with the ordinate.
-    line.scaled = given ? image_.projective : n.map || n.b != 0 || (image_.projective ? n.a != 0 : n.c != 0);
     const double factor = given ? parameters_.eps : parameters_.eps_factor * n.correlation;
-    if (!line.scaled) {
+    // One tolerance for the whole line: a length on a grid, or a noise that does not change with the ordinate.
+    if (!(given ? image_.projective : n.map || n.b != 0 || (image_.projective ? n.a != 0 : n.c != 0))) {
         line.tolerance = given ? factor : parameters_.eps_factor * noise_.sigma(1, 0);
         return;
     }
-    line.tolerance = 1;
-    line.scale.resize(line.y.size());
-    const auto inverse = [](T tolerance) { return 1 / (tolerance > least<T> ? tolerance : least<T>); };
-    const auto f = static_cast<T>(factor);
+    line.scale = scale;
+    const int size = line.path.size;
     if (n.map && !given) {
-        for (int k = 0; k < line.path.size; ++k) {
-            const auto i = static_cast<std::size_t>(k);
-            const T length = f * static_cast<T>(n.map[line.path.pixel(k, image_.cols)]);
-            line.scale[i] = inverse(image_.projective ? length * line.y[i] * line.y[i] : length);
+        for (int k = 0; k < size; ++k) {
+            const T length = static_cast<T>(factor) * static_cast<T>(n.map[line.path.pixel(k, image_.cols)]);
+            scale[k] = inverse(image_.projective ? length * line.y[k] * line.y[k] : length);
         }
         return;
     }
     // As a polynomial of the ordinate: sigma(1 / q) q^2 = a q^2 + b q + c.
-    const T a = given ? f : f * static_cast<T>(n.a), b = given ? 0 : f * static_cast<T>(n.b);
-    const T c = given ? 0 : f * static_cast<T>(n.c);
+    const auto a = static_cast<T>(given ? factor : factor * n.a), b = static_cast<T>(given ? 0 : factor * n.b);
+    const auto c = static_cast<T>(given ? 0 : factor * n.c);
     if (image_.projective)
-        for (std::size_t k = 0; k < line.y.size(); ++k) line.scale[k] = inverse((a * line.y[k] + b) * line.y[k] + c);
+        inverse_polynomial(line.y, size, c, b, a, scale);
     else
-        for (std::size_t k = 0; k < line.y.size(); ++k)
-            line.scale[k] = inverse(a + (b + c * std::abs(line.y[k])) * std::abs(line.y[k]));
+        inverse_polynomial(line.y, size, a, b, c, scale);
 }
 
 // The plane of a line of points holds its first and last point and the viewpoint (projective) or the viewing axis.
 template <class T>
-void LineReader<T>::read_points(Line<T>& line) const {
+void LineReader<T>::read_points(Line<T>& line, T* x, T* y) const {
     const Path& path = line.path;
     const auto point = [&](int k) {
         const T* p = image_.points + 3 * path.pixel(k, image_.cols);
         return Vector{static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
     };
     const auto valid = [](const Vector& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); };
-    line.start = 0, line.step = 1, line.kappa = 1;
-    line.x.resize(line.y.size());
-    std::fill(line.y.begin(), line.y.end(), nan<T>);
-    std::fill(line.x.begin(), line.x.end(), nan<T>);
+    line.x = x, line.y = y;
+    std::fill_n(x, path.size, nan<T>);
+    std::fill_n(y, path.size, nan<T>);
     int first = 0, last = path.size - 1;
     while (first < path.size && !valid(point(first))) ++first;
     while (last > first && !valid(point(last))) --last;
@@ -171,15 +203,14 @@ void LineReader<T>::read_points(Line<T>& line) const {
     for (int k = first; k <= last; ++k) {
         const Vector p = point(k);
         if (!valid(p)) continue;
-        const auto i = static_cast<std::size_t>(k);
         const double r = dot(p, away);
         if (!image_.projective) {
-            line.x[i] = static_cast<T>(dot(p, along));
-            line.y[i] = static_cast<T>(-r);
+            x[k] = static_cast<T>(dot(p, along));
+            y[k] = static_cast<T>(-r);
         } else if (r > 0) {
             const double z = r / line.kappa;  // along the axis, as with a camera
-            line.x[i] = static_cast<T>(dot(p, along) / z);
-            line.y[i] = static_cast<T>(1 / z);
+            x[k] = static_cast<T>(dot(p, along) / z);
+            y[k] = static_cast<T>(1 / z);
         }
     }
     // In the plane of the image, of which the axis is the normal.

@@ -28,10 +28,11 @@ struct OrdinateNoise {
     Noise noise;
     bool projective;
     double sigma(double ordinate, std::int64_t pixel) const {
-        const double z = projective ? 1 / ordinate : std::abs(ordinate);
-        const double length =
-            noise.correlation * (noise.map ? static_cast<double>(noise.map[pixel]) : noise.a + (noise.b + noise.c * z) * z);
-        return std::max(projective ? length * ordinate * ordinate : length, 1e-30);
+        const double z = std::abs(ordinate);  // or its inverse, where projective
+        const double length = noise.map ? static_cast<double>(noise.map[pixel]) * (projective ? z * z : 1)
+                              : projective ? (noise.a * z + noise.b) * z + noise.c
+                                           : (noise.c * z + noise.b) * z + noise.a;
+        return std::max(noise.correlation * length, 1e-30);
     }
 };
 
@@ -41,21 +42,21 @@ template <class T>
 struct Line {
     Path path{};
     int cols = 0;
-    std::vector<T> y, x, scale;  // scale: inverse tolerances, where they differ
-    bool irregular = false, scaled = false, projective = false;
+    const T* y = nullptr;
+    const T* x = nullptr;      // null where samples are one unit apart
+    const T* scale = nullptr;  // inverse tolerances, where they differ
+    bool projective = false;
     double start = 0, step = 1;
     double kappa = 1;  // in the plane, a point of inverse depth q lies at (w / q, kappa / q)
     double along[2] = {1, 0}, across = 0;  // the line in the plane of the image: direction, and distance from the origin
     double tolerance = 1;
     OrdinateNoise noise{};
 
-    double abscissa(int k) const { return irregular ? static_cast<double>(x[static_cast<std::size_t>(k)]) : k; }
-    double ordinate(int k) const { return static_cast<double>(y[static_cast<std::size_t>(k)]); }
+    double abscissa(int k) const { return x ? static_cast<double>(x[k]) : k; }
+    double ordinate(int k) const { return static_cast<double>(y[k]); }
     double depth(double ordinate) const { return projective ? 1 / ordinate : -ordinate; }
     double sigma_at(int k) const { return noise.sigma(ordinate(k), path.pixel(k, cols)); }
-    double tolerance_at(int k) const {
-        return scaled ? 1 / static_cast<double>(scale[static_cast<std::size_t>(k)]) : tolerance;
-    }
+    double tolerance_at(int k) const { return scale ? 1 / static_cast<double>(scale[k]) : tolerance; }
 
     // The tangent (s, r) of a curve, without its positive factor; r grows away from the viewer.
     struct Tangent {
@@ -72,6 +73,16 @@ struct Line {
     }
 };
 
+constexpr int strip_lines = 16;  // at most, in a strip: samples of a cache line
+
+// Neighbouring lines of one direction, and their samples where those do not lie in the image one after the other;
+// reused from strip to strip.
+template <class T>
+struct Strip {
+    std::vector<Line<T>> lines;
+    std::vector<T> y, x, scale;
+};
+
 // Reads the lines of one image.
 template <class T>
 class LineReader {
@@ -79,15 +90,14 @@ public:
     LineReader(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters)
         : image_(image), noise_{noise, image.projective}, parameters_(parameters) {}
 
-    // Makes lines[0] the line `first` of a direction, and so on with the next. Neighbouring lines that are read
-    // together share the cache lines of the image.
-    void read(int direction, int first, std::vector<Line<T>>& lines) const;
+    // The lines first to first + count - 1 of a direction. Read together they share the cache lines of the image.
+    void read(int direction, int first, int count, Strip<T>& strip) const;
 
 private:
-    void gather(std::vector<Line<T>>& lines) const;
     void place(Line<T>& line) const;
-    void read_points(Line<T>& line) const;
-    void set_tolerance(Line<T>& line) const;
+    void turn_rows(Strip<T>& strip) const;
+    void read_points(Line<T>& line, T* x, T* y) const;
+    void set_tolerance(Line<T>& line, T* scale) const;
 
     RangeImage<T> image_;
     OrdinateNoise noise_;

@@ -2,10 +2,12 @@
 #include "neighbours.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstddef>
 
 #include "parallel.hpp"
+#include "simd.hpp"
 
 namespace rangeedge {
 namespace {
@@ -14,86 +16,88 @@ constexpr double degrees = 57.295779513082320877;
 constexpr float reach = 4;             // pixels; weights fall from 1 at the candidate itself to 0 there
 constexpr float capped = 8;            // a single candidate's share of the evidence
 constexpr float lone = 1 / 3.0f;       // what a candidate without neighbours is worth
+constexpr float precise = 1e30f;       // at most so much does a slope count
 constexpr int kinds = jump_bit | convex_bit | concave_bit;
+constexpr int lanes = 16;
 
-struct Vector {
-    double x, y, z;
+// What neighbours are asked for; one array each.
+enum Field { x_field, y_field, evidence_field, fields_of_lines };
+enum TangentField {
+    along_x = y_field + 1, along_y, step_x, step_y, place_x, place_y,
+    precision, slope = precision + 2, value = slope + 2,  // of either side
+    fields_of_tangents = value + 2
 };
 
-// A candidate close to another; the weight falls with the distance.
-struct Neighbour {
-    const Candidate* candidate;
-    float weight;
-};
-
-// The first `count` items; reused from candidate to candidate.
-struct Neighbours {
-    std::vector<Neighbour> items;
-    std::size_t count = 0;
-    const Neighbour* begin() const { return items.data(); }
-    const Neighbour* end() const { return items.data() + count; }
-};
-
-// A copy of the candidates by square cells of the image, for those near a given one.
+// Candidates by square cells of the image, in arrays that may be read a few lanes beyond their end.
 class Grid {
 public:
-    Grid(const std::vector<Candidate>& candidates, int rows, int cols)
-        : rows_(rows / cell_size + 1), cols_(cols / cell_size + 1),
-          start_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(cols_) + 1, 0), places_(candidates.size()),
-          candidates_(candidates.size()) {
+    Grid(const std::vector<Candidate>& candidates, int rows, int cols, int fields)
+        : rows_(rows / cell_size + 1), cols_(cols / cell_size + 1), stride_(candidates.size() + lanes),
+          start_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(cols_) + 1, 0), order_(candidates.size()),
+          kinds_(stride_, 0), fields_(stride_ * static_cast<std::size_t>(fields), 0.0f) {
         for (const Candidate& c : candidates) ++start_[cell(column(c), row(c)) + 1];
         for (std::size_t p = 1; p < start_.size(); ++p) start_[p] += start_[p - 1];
         std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
         for (std::size_t i = 0; i < candidates.size(); ++i) {
             const Candidate& c = candidates[i];
             const auto k = static_cast<std::size_t>(next[cell(column(c), row(c))]++);
-            places_[k] = {c.x, c.y, c.kind & kinds, static_cast<std::int32_t>(i)};
-            candidates_[k] = c;
+            order_[k] = static_cast<std::int32_t>(i);
+            kinds_[k] = c.kind & kinds;
+            field(x_field)[k] = c.x;
+            field(y_field)[k] = c.y;
         }
     }
 
-    // Calls visit(candidate, its neighbours, its index in the vector that was copied) for all, cell by cell.
+    float* field(int f) { return fields_.data() + stride_ * static_cast<std::size_t>(f); }
+    const float* field(int f) const { return fields_.data() + stride_ * static_cast<std::size_t>(f); }
+    // Calls visit(index of a candidate, its place in the arrays) for all.
     template <class Visit>
-    void for_each(int threads, Visit&& visit) const {
-        parallel_for(static_cast<int>(candidates_.size()), threads, [&](int begin, int end, int) {
-            Neighbours near;
-            for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
-                find(candidates_[k], near);
-                visit(candidates_[k], near, static_cast<std::size_t>(places_[k].index));
-            }
+    void for_each(Visit&& visit) const {
+        for (std::size_t k = 0; k < order_.size(); ++k) visit(static_cast<std::size_t>(order_[k]), k);
+    }
+    // From now on the candidate at place k is nobody's neighbour.
+    void remove(std::size_t k) { kinds_[k] = 0; }
+
+    // A candidate and the places, in three rows of cells, where its neighbours are.
+    struct Near {
+        const Grid* grid;
+        float x, y;
+        int kinds;
+        int first[3], last[3];
+    };
+
+    // Calls visit(index, neighbours) for all candidates, several rows of cells at a time.
+    template <class Visit>
+    void for_each_near(int threads, Visit&& visit) const {
+        std::atomic<int> taken{0};
+        parallel_for(threads, threads, [&](int, int, int) {
+            for (int v; (v = taken++) < rows_;)
+                for (int u = 0; u < cols_; ++u) visit_cell(u, v, visit);
         });
     }
+
+    const int* kinds_of_places() const { return kinds_.data(); }
 
 private:
     static constexpr int cell_size = 4;  // pixels, no less than the reach
 
-    // What the search needs to know of a candidate.
-    struct Place {
-        float x, y;
-        int kind;
-        std::int32_t index;
-    };
-
-    // Finds c itself and every candidate within reach that shares a kind with it.
-    void find(const Candidate& c, Neighbours& near) const {
-        const int u = column(c), v = row(c);
+    template <class Visit>
+    void visit_cell(int u, int v, Visit&& visit) const {
+        const int begin = start_[cell(u, v)], end = start_[cell(u, v) + 1];
+        if (begin == end) return;
+        Near near{this, 0, 0, 0, {}, {}};
         const int left = std::max(0, u - 1), right = std::min(cols_ - 1, u + 1);
-        near.count = 0;
-        for (int y = std::max(0, v - 1); y <= std::min(rows_ - 1, v + 1); ++y) {
-            const auto first = static_cast<std::size_t>(start_[cell(left, y)]);
-            const auto last = static_cast<std::size_t>(start_[cell(right, y) + 1]);
-            if (near.items.size() < near.count + last - first) near.items.resize(2 * (near.count + last - first));
-            // Written before it is known to count: a branch on each would be mispredicted too often.
-            Neighbour* items = near.items.data();
-            std::size_t count = near.count;
-            for (std::size_t k = first; k < last; ++k) {
-                const Place& n = places_[k];
-                const float du = n.x - c.x, dv = n.y - c.y;
-                const float rest = 1 - (du * du + dv * dv) / (reach * reach);
-                items[count] = {&candidates_[k], rest * rest};
-                count += static_cast<std::size_t>(rest > 0) & static_cast<std::size_t>((n.kind & c.kind) != 0);
-            }
-            near.count = count;
+        for (int i = 0; i < 3; ++i) {
+            const int y = v + i - 1;
+            if (y < 0 || y >= rows_) continue;
+            near.first[i] = start_[cell(left, y)];
+            near.last[i] = start_[cell(right, y) + 1];
+        }
+        for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+            near.x = field(x_field)[k];
+            near.y = field(y_field)[k];
+            near.kinds = kinds_[k];
+            visit(static_cast<std::size_t>(order_[k]), near);
         }
     }
 
@@ -104,68 +108,136 @@ private:
     }
 
     int rows_, cols_;
-    std::vector<std::int32_t> start_;
-    std::vector<Place> places_;
-    std::vector<Candidate> candidates_;
+    std::size_t stride_;
+    std::vector<std::int32_t> start_, order_;
+    std::vector<int> kinds_;
+    std::vector<float> fields_;
 };
 
-float joint_significance(const Candidate& c, const Neighbours& near) {
-    float sum = 0;
-    for (const Neighbour& n : near) {
-        const float s = std::min(n.candidate->significance, capped);
-        sum += n.weight * s * s;
-    }
-    return std::max(std::sqrt(sum), c.significance * lone);
+// Calls visit(k, weights, dx, dy) for the places k, k + 1, ... of several candidates at a time: their distances from
+// the one they are near, and weights that fall with these and are 0 for those beyond reach or of another kind.
+template <int bytes, class Visit>
+RANGEEDGE_INLINE void for_each_lanes(const Grid::Near& near, Visit&& visit) {
+    using F = Floats<bytes>;
+    using I = Ints<bytes>;
+    const float *x = near.grid->field(x_field), *y = near.grid->field(y_field);
+    const int* kinds_there = near.grid->kinds_of_places();
+    const F cx = F::all(near.x), cy = F::all(near.y), one = F::all(1), share = F::all(1 / (reach * reach));
+    const F half = F::all(0.5f);
+    const I own = I::all(near.kinds), none = I::all(0);
+    for (int i = 0; i < 3; ++i)
+        for (int k = near.first[i]; k < near.last[i]; k += lanes) {
+            const F dx = F::load(x + k) - cx, dy = F::load(y + k) - cy;
+            F rest = one - (dx * dx + dy * dy) * share;
+            rest = half * (rest + magnitude(rest));  // 0 where negative
+            const I counts = negative(none - (I::load(kinds_there + k) & own)) & negative(I::from(k) - I::all(near.last[i]));
+            visit(k, from_bits(bits(rest * rest) & counts), dx, dy);
+        }
 }
 
-// The gradient of a surface's ordinate from slopes along several directions, by weighted least squares.
-struct Gradient {
-    double xx = 0, xy = 0, yy = 0, xm = 0, ym = 0, value = 0, weight = 0;
+template <int bytes>
+RANGEEDGE_INLINE float evidence_in(const Grid::Near& near) {
+    using F = Floats<bytes>;
+    const float* evidence = near.grid->field(evidence_field);
+    F sum = F::all(0);
+    for_each_lanes<bytes>(near, [&](int k, const F& w, const F&, const F&) RANGEEDGE_ALWAYS { sum += w * F::load(evidence + k); });
+    return sum.sum();
+}
+RANGEEDGE_VERSIONS(float, evidence, (const Grid::Near& near), (near))
 
-    void add(const float along[2], const Side& side, double w) {
-        const double x = static_cast<double>(along[0]), y = static_cast<double>(along[1]);
-        const double m = static_cast<double>(side.slope);
-        // A slope that its samples do not fix says nothing.
-        const double ws = side.slope_variance < endless ? w / std::max(static_cast<double>(side.slope_variance), 1e-30) : 0;
-        xx += ws * x * x, xy += ws * x * y, yy += ws * y * y;
-        xm += ws * x * m, ym += ws * y * m;
-        value += w * static_cast<double>(side.value), weight += w;
-    }
-    // The surface's normal; false where the directions do not fix it.
-    bool normal(bool projective, const double place[2], Vector& n) const {
-        const double determinant = xx * yy - xy * xy;
-        // Parallel directions, apart from rounding, or nearly so.
-        if (!(determinant > 1e-9 * (xx + yy) * (xx + yy)) || !(determinant > 0.02 * xx * yy)) return false;
-        const double gx = (yy * xm - xy * ym) / determinant, gy = (xx * ym - xy * xm) / determinant;
-        // q = gx X + gy Y + g0 is the plane gx x + gy y + g0 z = 1.
-        n = {gx, gy, projective ? value / weight - gx * place[0] - gy * place[1] : 1};
-        return true;
-    }
+// Weighted sums of the places of neighbours.
+struct PlaceSums {
+    float n, x, y, xx, xy, yy;
 };
+
+template <int bytes>
+RANGEEDGE_INLINE PlaceSums place_sums_in(const Grid::Near& near) {
+    using F = Floats<bytes>;
+    F n = F::all(0), x = n, y = n, xx = n, xy = n, yy = n;
+    for_each_lanes<bytes>(near, [&](int, const F& w, const F& dx, const F& dy) RANGEEDGE_ALWAYS {
+        const F wx = w * dx, wy = w * dy;
+        n += w, x += wx, y += wy, xx += wx * dx, xy += wx * dy, yy += wy * dy;
+    });
+    return {n.sum(), x.sum(), y.sum(), xx.sum(), xy.sum(), yy.sum()};
+}
+RANGEEDGE_VERSIONS(PlaceSums, place_sums, (const Grid::Near& near), (near))
 
 // The line on which a candidate and its neighbours lie: across it, their positions vary least.
 struct CommonLine {
     double across[2];  // unit normal
     double offset;     // of the line from the candidate, along `across`
-    double weight;     // of all neighbours
     bool found;
 };
 
-CommonLine common_line(const Candidate& c, const Neighbours& near) {
-    double n = 0, mx = 0, my = 0, sxx = 0, sxy = 0, syy = 0;
-    for (const Neighbour& other : near) {
-        const double w = static_cast<double>(other.weight);
-        const double x = static_cast<double>(other.candidate->x - c.x);
-        const double y = static_cast<double>(other.candidate->y - c.y);
-        n += w, mx += w * x, my += w * y, sxx += w * x * x, sxy += w * x * y, syy += w * y * y;
-    }
-    mx /= n, my /= n;
-    sxx = sxx / n - mx * mx, sxy = sxy / n - mx * my, syy = syy / n - my * my;
-    const double angle = 0.5 * std::atan2(2 * sxy, sxx - syy);  // of the line
-    CommonLine line{{-std::sin(angle), std::cos(angle)}, 0, n, sxx + syy > 0.05};
+CommonLine common_line(const Grid::Near& near) {
+    const PlaceSums sums = place_sums(near);
+    const double n = sums.n, mx = sums.x / n, my = sums.y / n;
+    const double sxx = sums.xx / n - mx * mx, sxy = sums.xy / n - mx * my, syy = sums.yy / n - my * my;
+    // The line runs at half the angle of (sxx - syy, 2 sxy).
+    const double spread = std::hypot(sxx - syy, 2 * sxy);
+    const double cosine = spread > 0 ? (sxx - syy) / spread : 1, sine = spread > 0 ? 2 * sxy / spread : 0;
+    const double larger = std::sqrt((1 + std::abs(cosine)) / 2), smaller = std::abs(sine) / (2 * larger);
+    CommonLine line{};
+    line.across[0] = -std::copysign(cosine >= 0 ? smaller : larger, sine);
+    line.across[1] = cosine >= 0 ? larger : smaller;
     line.offset = line.across[0] * mx + line.across[1] * my;
+    line.found = sxx + syy > 0.05;
     return line;
 }
+
+// For the gradient of a surface's ordinate from slopes along several directions, by weighted least squares.
+struct GradientSums {
+    float xx, xy, yy, xm, ym, value;
+
+    // The surface's normal; false where the directions do not fix it.
+    bool normal(bool projective, const double place[2], double weight, double n[3]) const {
+        const double x2 = xx, y2 = yy, determinant = x2 * y2 - double{xy} * xy;
+        // Parallel directions, apart from rounding, or nearly so.
+        if (!(determinant > 1e-9 * (x2 + y2) * (x2 + y2)) || !(determinant > 0.02 * x2 * y2)) return false;
+        n[0] = (y2 * xm - double{xy} * ym) / determinant, n[1] = (x2 * ym - double{xy} * xm) / determinant;
+        // q = gx X + gy Y + g0 is the plane gx x + gy y + g0 z = 1.
+        n[2] = projective ? value / weight - n[0] * place[0] - n[1] * place[1] : 1;
+        return true;
+    }
+};
+
+// Sums over the tangents on either side of an edge.
+struct TangentSums {
+    GradientSums sides[2];
+    float weight, place[2];
+};
+
+template <int bytes>
+RANGEEDGE_INLINE TangentSums tangent_sums_in(const Grid::Near& near, float across_x, float across_y) {
+    using F = Floats<bytes>;
+    const auto load = [&near](int field, int k) RANGEEDGE_ALWAYS { return F::load(near.grid->field(field) + k); };
+    const F ax = F::all(across_x), ay = F::all(across_y), zero = F::all(0);
+    F weight = zero, u = zero, v = zero;
+    F xx[2] = {zero, zero}, xy[2] = {zero, zero}, yy[2] = {zero, zero};
+    F xm[2] = {zero, zero}, ym[2] = {zero, zero}, values[2] = {zero, zero};
+    for_each_lanes<bytes>(near, [&](int k, const F& w, const F&, const F&) RANGEEDGE_ALWAYS {
+        const F x = load(along_x, k), y = load(along_y, k);
+        weight += w, u += w * load(place_x, k), v += w * load(place_y, k);
+        // A neighbour whose line crosses the edge the other way has the sides exchanged.
+        const auto forward = negative(bits(zero - (load(step_x, k) * ax + load(step_y, k) * ay)));
+        for (int i = 0; i < 2; ++i) {
+            const auto on_side = [&](int field) RANGEEDGE_ALWAYS {
+                return select(forward, load(field + i, k), load(field + 1 - i, k));
+            };
+            const F p = w * on_side(precision), m = on_side(slope), px = p * x, py = p * y;
+            xx[i] += px * x, xy[i] += px * y, yy[i] += py * y;
+            xm[i] += px * m, ym[i] += py * m;
+            values[i] += w * on_side(value);
+        }
+    });
+    TangentSums sums{};
+    for (int i = 0; i < 2; ++i)
+        sums.sides[i] = {xx[i].sum(), xy[i].sum(), yy[i].sum(), xm[i].sum(), ym[i].sum(), values[i].sum()};
+    sums.weight = weight.sum();
+    sums.place[0] = u.sum(), sums.place[1] = v.sum();
+    return sums;
+}
+RANGEEDGE_VERSIONS(TangentSums, tangent_sums, (const Grid::Near& near, float across_x, float across_y), (near, across_x, across_y))
 
 // One step of a candidate's scan line.
 struct Step {
@@ -177,10 +249,9 @@ Step step_of(const Candidate& c) {
 
 // Moves a crease along its scan line onto the line it has in common with its neighbours, unless that leads off the data.
 template <class T>
-void align(const Candidate& c, const Neighbours& near, const RangeImage<T>& image, double max_shift,
-           Candidate& moved) {
+void align(Candidate& c, const Grid::Near& near, const RangeImage<T>& image, double max_shift) {
     if ((c.kind & jump_bit) || !(c.crease > 0)) return;
-    const CommonLine line = common_line(c, near);
+    const CommonLine line = common_line(near);
     const Step step = step_of(c);
     const double along = step.dcol * line.across[0] + step.drow * line.across[1];
     if (!line.found || std::abs(along) < 0.3) return;
@@ -190,35 +261,45 @@ void align(const Candidate& c, const Neighbours& near, const RangeImage<T>& imag
     const int u = static_cast<int>(step.dcol ? std::floor(x) : std::round(x));
     const int v = static_cast<int>(step.drow > 0 ? std::floor(y) : step.drow < 0 ? std::ceil(y) : std::round(y));
     if (!image.valid_at(u, v) || !image.valid_at(u + step.dcol, v + step.drow)) return;
-    moved.shift = static_cast<float>(total);
-    moved.x = static_cast<float>(x);
-    moved.y = static_cast<float>(y);
-    moved.before = v * image.cols + u;
-    moved.after = (v + step.drow) * image.cols + u + step.dcol;
+    c.shift = static_cast<float>(total);
+    c.x = static_cast<float>(x);
+    c.y = static_cast<float>(y);
+    c.before = v * image.cols + u;
+    c.after = (v + step.drow) * image.cols + u + step.dcol;
 }
 
-// The angle between the two surfaces that meet at c, in degrees; negative where its neighbours do not fix it.
-double normal_angle(const Candidate& c, const Neighbours& near, bool projective) {
-    const CommonLine line = common_line(c, near);
+// The angle between the two surfaces that meet at a candidate, in degrees; negative where its neighbours do not fix it.
+double normal_angle(const Grid::Near& near, bool projective) {
+    const CommonLine line = common_line(near);
     if (!line.found) return -1;
-    const double* across = line.across;
-    Gradient a, b;
-    double place[2] = {0, 0};
-    for (const Neighbour& n : near) {
-        const Candidate& other = *n.candidate;
-        const double w = static_cast<double>(n.weight);
-        const Step step = step_of(other);
-        const bool forward = step.dcol * across[0] + step.drow * across[1] > 0;
-        a.add(other.along, other.sides[forward ? 0 : 1], w);
-        b.add(other.along, other.sides[forward ? 1 : 0], w);
-        for (int i = 0; i < 2; ++i) place[i] += w * static_cast<double>(other.place[i]);
-    }
-    for (double& p : place) p /= line.weight;
-    Vector na{}, nb{};
-    if (!a.normal(projective, place, na) || !b.normal(projective, place, nb)) return -1;
-    const Vector cross{na.y * nb.z - na.z * nb.y, na.z * nb.x - na.x * nb.z, na.x * nb.y - na.y * nb.x};
-    const double dot = na.x * nb.x + na.y * nb.y + na.z * nb.z;
-    return std::atan2(std::sqrt(cross.x * cross.x + cross.y * cross.y + cross.z * cross.z), dot) * degrees;
+    const TangentSums sums = tangent_sums(near, static_cast<float>(line.across[0]), static_cast<float>(line.across[1]));
+    const double place[2] = {sums.place[0] / sums.weight, sums.place[1] / sums.weight};
+    double a[3], b[3];
+    for (int i = 0; i < 2; ++i)
+        if (!sums.sides[i].normal(projective, place, sums.weight, i ? b : a)) return -1;
+    const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
+    const double dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    return std::atan2(std::sqrt(x * x + y * y + z * z), dot) * degrees;
+}
+
+// The grid of candidates with what `normal_angle` asks of them.
+Grid tangents_of(const std::vector<Candidate>& candidates, int rows, int cols) {
+    Grid grid(candidates, rows, cols, fields_of_tangents);
+    grid.for_each([&](std::size_t i, std::size_t k) {
+        const Candidate& c = candidates[i];
+        const Step step = step_of(c);
+        grid.field(along_x)[k] = c.along[0], grid.field(along_y)[k] = c.along[1];
+        grid.field(step_x)[k] = static_cast<float>(step.dcol), grid.field(step_y)[k] = static_cast<float>(step.drow);
+        grid.field(place_x)[k] = c.place[0], grid.field(place_y)[k] = c.place[1];
+        for (int side = 0; side < 2; ++side) {
+            const Side& s = c.sides[side];
+            // A slope that its samples do not fix says nothing.
+            grid.field(precision + side)[k] = s.slope_variance < endless ? std::min(1 / s.slope_variance, precise) : 0;
+            grid.field(slope + side)[k] = s.slope;
+            grid.field(value + side)[k] = s.value;
+        }
+    });
+    return grid;
 }
 
 }  // namespace
@@ -226,26 +307,33 @@ double normal_angle(const Candidate& c, const Neighbours& near, bool projective)
 template <class T>
 void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const Parameters& parameters) {
     const auto least = static_cast<float>(parameters.min_significance);
-    if (!(least > 0 || parameters.max_shift > 0 || parameters.normals)) return;
-    // Each step sees all candidates as the step before left them.
-    const auto update = [&](auto&& step) {
-        const Grid grid(candidates, image.rows, image.cols);
-        grid.for_each(parameters.threads, [&](const Candidate& c, const Neighbours& near, std::size_t i) {
-            step(c, near, candidates[i]);
-        });
-    };
-    update([](const Candidate& c, const Neighbours& near, Candidate& joined) {
-        joined.significance = joint_significance(c, near);
+    const bool aligned = parameters.max_shift > 0;
+    if (!(least > 0 || aligned || parameters.normals)) return;
+    Grid grid(candidates, image.rows, image.cols, fields_of_lines);
+    grid.for_each([&](std::size_t i, std::size_t k) {
+        const float s = std::min(candidates[i].significance, capped);
+        grid.field(evidence_field)[k] = s * s;
+    });
+    grid.for_each_near(parameters.threads, [&](std::size_t i, const Grid::Near& near) {
+        Candidate& c = candidates[i];
+        c.significance = std::max(std::sqrt(evidence(near)), c.significance * lone);
     });
     const auto weak = [&](const Candidate& c) { return c.significance < least; };
+    if (aligned) {
+        grid.for_each([&](std::size_t i, std::size_t k) {
+            if (weak(candidates[i])) grid.remove(k);
+        });
+        grid.for_each_near(parameters.threads, [&](std::size_t i, const Grid::Near& near) {
+            if (!weak(candidates[i])) align(candidates[i], near, image, parameters.max_shift);
+        });
+    }
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), weak), candidates.end());
-    update([&](const Candidate& c, const Neighbours& near, Candidate& moved) {
-        align(c, near, image, parameters.max_shift, moved);
-    });
     if (!parameters.normals) return;
-    update([&](const Candidate& c, const Neighbours& near, Candidate& measured) {
-        const double angle = c.crease > 0 ? normal_angle(c, near, image.projective) : -1;
-        if (angle >= 0) measured.crease = static_cast<float>(angle);
+    const Grid tangents = tangents_of(candidates, image.rows, image.cols);
+    tangents.for_each_near(parameters.threads, [&](std::size_t i, const Grid::Near& near) {
+        Candidate& c = candidates[i];
+        const double angle = c.crease > 0 ? normal_angle(near, image.projective) : -1;
+        if (angle >= 0) c.crease = static_cast<float>(angle);
     });
 }
 

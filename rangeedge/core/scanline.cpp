@@ -51,44 +51,45 @@ Worst<T> worst_of(const Run<T>& run, const ThreePoint<T>& curve, int first, int 
     return worst;
 }
 
-// The same for eight or more samples one unit apart, eight at a time: each lane keeps its own worst. The last eight
-// overlap those before them, which changes nothing.
-RANGEEDGE_WIDE
-Worst<float> worst_of_lanes(const float* y, const float* scale, const ThreePoint<float>& curve, int first, int last) {
-    const Int8 count{0, 1, 2, 3, 4, 5, 6, 7};
-    Int8 at = count + first;
-    Float8 worst = {-1, -1, -1, -1, -1, -1, -1, -1};
-    for (int next = first; next < last; next += 8) {
-        const int k = std::min(next, last - 8);
-        const Int8 index = count + k;
-        const Float8 t = __builtin_convertvector(index, Float8) - curve.origin;
-        Float8 value, factor;
-        std::memcpy(&value, y + k, sizeof value);
-        Float8 r = value - (curve.ym + t * (curve.b + curve.a * t));
-        r = reinterpret_cast<Float8>(reinterpret_cast<Int8>(r) & 0x7fffffff);
-        if (scale) {
-            std::memcpy(&factor, scale + k, sizeof factor);
-            r *= factor;
+// The same for sixteen or more samples one unit apart, sixteen at a time: each lane keeps its own worst. The last
+// sixteen overlap those before them, which changes nothing.
+template <int bytes>
+RANGEEDGE_INLINE Worst<float> worst_of_lanes_in(const float* y, const float* scale, const ThreePoint<float>& curve,
+                                                int first, int last) {
+    using F = Floats<bytes>;
+    using I = Ints<bytes>;
+    const F ym = F::all(curve.ym), a = F::all(curve.a), b = F::all(curve.b);
+    const auto midpoint = static_cast<int>(curve.origin);
+    F worst = F::all(-1);
+    I at = I::all(first);
+    for (int next = first; next < last; next += F::count) {
+        const int k = std::min(next, last - F::count);
+        const F t = F::from(static_cast<float>(k - midpoint));
+        F r = magnitude(F::load(y + k) - (ym + t * (b + a * t)));
+        if (scale) r *= F::load(scale + k);
+        const I index = I::from(k);
+        for (int p = 0; p < F::parts; ++p) {
+            const auto larger = r.part[p] > worst.part[p];
+            worst.part[p] = larger ? r.part[p] : worst.part[p];
+            at.part[p] = larger ? index.part[p] : at.part[p];
         }
-        const Int8 larger = r > worst;
-        worst = larger ? r : worst;
-        at = larger ? index : at;
     }
     // Across the lanes, without branches: which is the worst cannot be foretold.
-    float most = worst[0];
-    for (int i = 1; i < 8; ++i) most = worst[i] > most ? worst[i] : most;
-    at = worst == most ? at : last;
-    int first_at = at[0];
-    for (int i = 1; i < 8; ++i) first_at = std::min(first_at, at[i]);
-    return {most, first_at};
+    const float most = worst.joined([](float p, float q) { return p > q ? p : q; });
+    const I beyond = I::all(last);
+    for (int p = 0; p < F::parts; ++p) at.part[p] = worst.part[p] == most ? at.part[p] : beyond.part[p];
+    return {most, at.joined([](int p, int q) { return p < q ? p : q; })};
 }
+RANGEEDGE_VERSIONS(Worst<float>, worst_of_lanes,
+                   (const float* y, const float* scale, const ThreePoint<float>& curve, int first, int last),
+                   (y, scale, curve, first, last))
 
 template <class T>
 Worst<T> worst_sample(const Run<T>& run, const Segment& s) {
     const ThreePoint<T> curve(run, s);
     const int first = s.first + 1;
     if constexpr (std::is_same_v<T, float>)
-        if (!run.x && s.last - first >= 8) return worst_of_lanes(run.y, run.scale, curve, first, s.last);
+        if (!run.x && s.last - first >= 16) return worst_of_lanes(run.y, run.scale, curve, first, s.last);
     return worst_of(run, curve, first, s.last);
 }
 

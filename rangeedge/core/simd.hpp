@@ -1,22 +1,140 @@
-// Short vectors for the innermost loops.
+// Loops over many lanes, written once for every width of vector that processors have.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstring>
 
-// Marks functions that are compiled a second time for processors with AVX2 and chosen at load time. Without
-// contraction both forms round alike. Sanitizers cannot run that early.
+#define RANGEEDGE_ALWAYS __attribute__((always_inline))  // of lambdas: out of line they would be narrow
+#define RANGEEDGE_INLINE inline RANGEEDGE_ALWAYS
+
+// Marks a function that is compiled for wider vectors too; RANGEEDGE_VERSIONS defines name(parameters) from a template
+// name_in<bytes>, once for every width. The widest that the processor has is chosen at load time. Without contraction
+// all round alike. Sanitizers cannot run that early.
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__)
-#define RANGEEDGE_WIDE __attribute__((target_clones("avx2", "default")))
+    !defined(__SANITIZE_THREAD__) && !defined(RANGEEDGE_NARROW)
+#define RANGEEDGE_AVX512 "avx512f,avx512bw,avx512dq,avx512vl"
+#define RANGEEDGE_WIDE __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
+#define RANGEEDGE_VERSIONS(result, name, parameters, arguments)                                               \
+    __attribute__((target(RANGEEDGE_AVX512))) result name parameters { return name##_in<64> arguments; } \
+    __attribute__((target("avx2"))) result name parameters { return name##_in<32> arguments; }           \
+    __attribute__((target("default"))) result name parameters { return name##_in<16> arguments; }
 #else
 #define RANGEEDGE_WIDE
+#define RANGEEDGE_VERSIONS(result, name, parameters, arguments) \
+    result name parameters { return name##_in<16> arguments; }
 #endif
 
 namespace rangeedge {
 
-typedef float Float4 __attribute__((vector_size(16)));
-typedef double Double4 __attribute__((vector_size(32)));
-typedef float Float8 __attribute__((vector_size(32)));
-typedef int Int8 __attribute__((vector_size(32)));
+// 64 bytes of T (float, int or double), in vectors of `bytes` bytes. Neither what a lane holds nor the order in which
+// lanes are joined depends on that width.
+template <class T, int bytes>
+struct Lanes {
+    typedef T Vector __attribute__((vector_size(bytes)));
+    static constexpr int count = 64 / sizeof(T), parts = 64 / bytes, width = bytes / static_cast<int>(sizeof(T));
+    Vector part[parts];
+
+    static RANGEEDGE_INLINE Lanes all(T value) {
+        T values[count];
+        for (T& v : values) v = value;
+        return load(values);
+    }
+    // first, first + 1, ...
+    static RANGEEDGE_INLINE Lanes from(T first) {
+        static constexpr T steps[16] = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+        return load(steps) + all(first);
+    }
+    static RANGEEDGE_INLINE Lanes load(const T* values) {
+        Lanes r;
+        for (int p = 0; p < parts; ++p) std::memcpy(&r.part[p], values + p * width, bytes);
+        return r;
+    }
+    RANGEEDGE_INLINE void store(T* values) const {
+        for (int p = 0; p < parts; ++p) std::memcpy(values + p * width, &part[p], bytes);
+    }
+#define RANGEEDGE_OPERATOR(op)                                                  \
+    friend RANGEEDGE_INLINE Lanes operator op(const Lanes& a, const Lanes& b) { \
+        Lanes r;                                                                \
+        for (int p = 0; p < parts; ++p) r.part[p] = a.part[p] op b.part[p];     \
+        return r;                                                               \
+    }                                                                           \
+    RANGEEDGE_INLINE Lanes& operator op##=(const Lanes & b) { return *this = *this op b; }
+    RANGEEDGE_OPERATOR(+)
+    RANGEEDGE_OPERATOR(-)
+    RANGEEDGE_OPERATOR(*)
+    RANGEEDGE_OPERATOR(&)  // of ints
+    RANGEEDGE_OPERATOR(^)
+#undef RANGEEDGE_OPERATOR
+
+    // Joins the lanes two by two: each one of the first half with that of the second half, and so on.
+    template <class Join>
+    RANGEEDGE_INLINE T joined(Join&& join) const {
+        T values[count];
+        store(values);
+        join_halves<count / 2>(values, join);
+        return values[0];
+    }
+    RANGEEDGE_INLINE T sum() const {
+        return joined([](T a, T b) { return a + b; });
+    }
+
+private:
+    template <int half, class Join>
+    static RANGEEDGE_INLINE void join_halves(T* values, Join&& join) {
+        for (int i = 0; i < half; ++i) values[i] = join(values[i], values[i + half]);
+        if constexpr (half > 1) join_halves<half / 2>(values, join);
+    }
+};
+
+// Sixteen floats or ints, eight doubles.
+template <int bytes>
+using Floats = Lanes<float, bytes>;
+template <int bytes>
+using Ints = Lanes<int, bytes>;
+template <int bytes>
+using Doubles = Lanes<double, bytes>;
+
+template <int bytes>
+RANGEEDGE_INLINE Doubles<bytes> load_doubles(const float* values) {
+    typedef float Half __attribute__((vector_size(bytes / 2)));
+    Doubles<bytes> r;
+    for (int p = 0; p < r.parts; ++p) {
+        Half half;
+        std::memcpy(&half, values + p * r.width, sizeof half);
+        r.part[p] = __builtin_convertvector(half, typename Doubles<bytes>::Vector);
+    }
+    return r;
+}
+
+template <int bytes>
+RANGEEDGE_INLINE Ints<bytes> bits(const Floats<bytes>& a) {
+    Ints<bytes> r;
+    std::memcpy(&r, &a, sizeof r);
+    return r;
+}
+template <int bytes>
+RANGEEDGE_INLINE Floats<bytes> from_bits(const Ints<bytes>& a) {
+    Floats<bytes> r;
+    std::memcpy(&r, &a, sizeof r);
+    return r;
+}
+
+template <int bytes>
+RANGEEDGE_INLINE Floats<bytes> magnitude(const Floats<bytes>& a) {
+    return from_bits(bits(a) & Ints<bytes>::all(0x7fffffff));
+}
+
+// All bits where a < 0, else none.
+template <int bytes>
+RANGEEDGE_INLINE Ints<bytes> negative(const Ints<bytes>& a) {
+    Ints<bytes> r;
+    for (int p = 0; p < r.parts; ++p) r.part[p] = a.part[p] >> 31;
+    return r;
+}
+
+// a where all bits are set, b where none is.
+template <int bytes>
+RANGEEDGE_INLINE Floats<bytes> select(const Ints<bytes>& where, const Floats<bytes>& a, const Floats<bytes>& b) {
+    return from_bits(bits(b) ^ ((bits(a) ^ bits(b)) & where));
+}
 
 }  // namespace rangeedge
