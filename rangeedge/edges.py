@@ -27,8 +27,6 @@ from ._constants import (
 from .geometry import RangeFrame, range_frame
 from .noise import kernel_noise
 
-_THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
-
 
 @dataclass(frozen=True)
 class ScanLineParams:
@@ -392,5 +390,5 @@ def _kernel_parameters(params: ScanLineParams, frame: RangeFrame) -> _core.Param
         max_gap=params.maxGap,
         merge_significance=params.mergeSignificance,
         min_significance=params.minSignificance,
-        threads=cv2.getNumThreads() if frame.shape[0] * frame.shape[1] >= _THREAD_PIXELS else 1,
+        threads=frame.threads,
     )

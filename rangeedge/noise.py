@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import cv2
 import numpy as np
 
+from . import _core
 from ._args import described, error, fail, number
 from .geometry import RangeFrame, range_frame
 
-_LAG = 6  # samples: noise of neighbours this far apart counts as independent
 _CORRELATION_MAX = 2.5  # beyond it, curvature rather than noise
-_DEPTH_BINS = 8
-_WINDOWS = 1 << 15  # along rows, and along columns, that an estimate rests on at most
-_BIN_SIZE = 50  # differences that a bin needs
-_TRIM = 0.75  # share of the differences, the small ones, that the estimate rests on
-_TRIMMED_NORMAL = 0.607  # deviation of a normal variable within its central 75 %
-_QUANTISED = 0.05  # share of differences other than zero that tells steps from edges
-_LEAST_MOVED = 0.05  # quantile of these that stands for one step
 _FINEST = 3e-5  # of the distance, or of the range of heights: no range sensor resolves more
 
 
@@ -136,77 +128,18 @@ def estimateNoise(
 
 def noise_of(frame: RangeFrame) -> NoiseModel:
     """The noise of a checked range image."""
-    differences, ordinates = _third_differences(frame.ordinate, 1)
-    far, _ = _third_differences(frame.ordinate, _LAG)
-    near_sigma, far_sigma = _trimmed_deviation(differences), _trimmed_deviation(far)
-    correlation = float(np.clip(far_sigma / near_sigma, 1, _CORRELATION_MAX)) if near_sigma > 0 else 1.0
+    near, far, lowest, highest, ordinates, sigmas = _core.noise_statistics(frame.ordinate, frame.threads)
+    correlation = float(np.clip(far / near, 1, _CORRELATION_MAX)) if near > 0 else 1.0
     if not frame.projective:
-        return NoiseModel(a=max(near_sigma, _FINEST * _extent(ordinates)), correlation=correlation)
-    if len(differences) == 0:
+        extent = highest - lowest if highest > lowest else 1.0
+        return NoiseModel(a=max(near, _FINEST * extent), correlation=correlation)
+    if len(ordinates) == 0:
         return NoiseModel(b=_FINEST)
-    a, c = _fitted(*_deviation_by_depth(differences, ordinates))
-    nearest = 1 / float(ordinates.max())
-    if a + c * nearest**2 < _FINEST * nearest:
+    z = 1 / ordinates
+    a, c = _fitted(z, np.maximum(sigmas * z * z, _FINEST * z))
+    if a + c / highest**2 < _FINEST / highest:
         return NoiseModel(b=_FINEST, correlation=correlation)
     return NoiseModel(a=a, c=c, correlation=correlation)
-
-
-def _third_differences(ordinate: np.ndarray, lag: int) -> tuple[np.ndarray, np.ndarray]:
-    """|y0 - 3 y1 + 3 y2 - y3| along rows and columns, and the means; windows with invalid pixels left out.
-
-    The mean of a window is independent of its difference, so that bins of it do not select among the differences.
-    Of a large image every so many lines are enough.
-    """
-    found, where = [np.empty(0)], [np.empty(0)]
-    for y in (ordinate, ordinate.T):
-        if len(y) > 3 * lag:
-            y = y[:, :: 1 + y.size // _WINDOWS].astype(np.float64)
-            outer, inner = (y[: -3 * lag], y[3 * lag :]), (y[lag : -2 * lag], y[2 * lag : -lag])
-            d = np.abs(outer[1] - outer[0] - 3 * (inner[1] - inner[0]))
-            inside = np.isfinite(d)
-            found.append(d[inside])
-            where.append((outer[0] + inner[0] + inner[1] + outer[1])[inside] / 4)
-    return np.concatenate(found), np.concatenate(where)
-
-
-def _trimmed_deviation(differences: np.ndarray) -> float:
-    """Deviation of the noise behind third differences, of which few lie across edges."""
-    kept = int(_TRIM * len(differences))
-    if kept == 0:
-        return 0.0
-    ordered = np.sort(differences)
-    sigma = float(np.sqrt(np.mean(np.square(ordered[:kept], dtype=np.float64)) / 20)) / _TRIMMED_NORMAL
-    # Where values are coarsely quantised most differences are zero and the others multiples of the step; the least of
-    # these, unless they are so few that they are edges, bounds the deviation by that of rounding.
-    moved = ordered[np.searchsorted(ordered, 0, side="right") :]
-    least = int(_LEAST_MOVED * len(moved))
-    if len(moved) < _QUANTISED * len(differences) or least >= len(moved):
-        return sigma
-    return max(sigma, float(moved[least]) / np.sqrt(12))
-
-
-def _extent(ordinates: np.ndarray) -> float:
-    extent = float(np.ptp(ordinates)) if len(ordinates) else 0.0
-    return extent if extent > 0 else 1.0
-
-
-def _deviation_by_depth(differences: np.ndarray, inverse: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Depths and the deviation of length there, for bins of equally many differences of inverse depth."""
-    bins = max(1, min(_DEPTH_BINS, len(inverse) // _BIN_SIZE))
-    order = np.argsort(inverse)
-    differences, inverse = differences[order], inverse[order].astype(np.float64)
-    at = np.arange(1, bins) / bins * (len(inverse) - 1)
-    below = at.astype(int)
-    borders = inverse[below] + (at - below) * (inverse[below + 1] - inverse[below])
-    cuts = np.searchsorted(inverse, borders, side="right")
-    depths, sigmas = [], []
-    for start, end in pairwise((0, *cuts.tolist(), len(inverse))):
-        if start == end:
-            continue
-        z = 1 / float(inverse[(start + end - 1) // 2] + inverse[(start + end) // 2]) * 2
-        depths.append(z)
-        sigmas.append(max(_trimmed_deviation(differences[start:end]) * z * z, _FINEST * z))
-    return np.array(depths), np.array(sigmas)
 
 
 def _fitted(z: np.ndarray, sigma: np.ndarray) -> tuple[float, float]:

@@ -29,20 +29,13 @@ Sums sums_of(const T* y, int n, double base) {
     return s;
 }
 
-// Eight at a time, and those that are left in the same lanes.
 template <int bytes>
 RANGEEDGE_INLINE Sums sums_of_in(const float* y, int n, double base) {
     using D = Doubles<bytes>;
     const D bases = D::all(base), step = D::all(D::count);
     D h0 = D::all(0), h1 = h0, h2 = h0, hh = h0, t = D::from(0);
-    float rest[D::count];
     for (int k = 0; k < n; k += D::count) {
-        const float* values = y + k;
-        if (k + D::count > n) {
-            for (int i = 0; i < D::count; ++i) rest[i] = k + i < n ? values[i] : static_cast<float>(base);
-            values = rest;
-        }
-        const D h = load_doubles<bytes>(values) - bases, ht = h * t;
+        const D h = first_lanes(load_doubles<bytes>(y + k) - bases, n - k), ht = h * t;
         h0 += h, h1 += ht, h2 += ht * t, hh += h * h;
         t += step;
     }

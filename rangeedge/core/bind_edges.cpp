@@ -9,7 +9,9 @@
 #include <type_traits>
 
 #include "edges.hpp"
+#include "noise.hpp"
 #include "scanline.hpp"
+#include "simd.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -56,9 +58,11 @@ nb::ndarray<nb::numpy, int> split_scan_line(In<T> y, std::optional<In<T>> x, dou
     std::vector<Segment> pending, segments;
     {
         nb::gil_scoped_release release;
+        std::vector<T> samples(y.data(), y.data() + y.size());
+        samples.resize(y.size() + padding);
         const T* abscissa = x ? x->data() : nullptr;
-        for_each_run(y.data(), abscissa, static_cast<int>(y.size()), [&](int first, int last) {
-            split_run(Run<T>{y.data(), abscissa, nullptr, first, last}, static_cast<T>(eps), pending, segments);
+        for_each_run(samples.data(), abscissa, static_cast<int>(y.size()), [&](int first, int last) {
+            split_run(Run<T>{samples.data(), abscissa, nullptr, first, last}, static_cast<T>(eps), pending, segments);
         });
     }
     return handed_over<int>(std::move(segments));
@@ -88,6 +92,20 @@ Noise noise_model(const NoiseArgs& abc, const std::optional<In<float>>& map) {
 template <class T>
 void define(nb::module_& m) {
     m.def("split_scan_line", &split_scan_line<T>, "y"_a.noconvert(), "x"_a.noconvert().none(), "eps"_a);
+    m.def(
+        "noise_statistics",
+        [](In<T> ordinate, int threads) {
+            NoiseStatistics found;
+            {
+                nb::gil_scoped_release release;
+                found = noise_statistics(ordinate.data(), static_cast<int>(ordinate.shape(0)),
+                                         static_cast<int>(ordinate.shape(1)), threads);
+            }
+            return nb::make_tuple(found.near, found.far, found.lowest, found.highest,
+                                  handed_over<double>(std::move(found.ordinates)),
+                                  handed_over<double>(std::move(found.deviations)));
+        },
+        "ordinate"_a.noconvert(), "threads"_a);
     m.def(
         "edge_candidates",
         [](In<T> src, bool projective, std::array<double, 6> to_plane, std::array<double, 3> axis, NoiseArgs noise,

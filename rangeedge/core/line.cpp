@@ -74,7 +74,7 @@ void LineReader<T>::read(int direction, int first, int count, Strip<T>& strip) c
         line.noise = noise_;
         longest = std::max(longest, line.path.size);
     }
-    const auto size = static_cast<std::size_t>(longest) * strip.lines.size();
+    const auto size = static_cast<std::size_t>(longest) * strip.lines.size() + padding;
     std::size_t used = 0;
     if (image_.points) {
         strip.x.resize(size), strip.y.resize(size);
@@ -85,7 +85,7 @@ void LineReader<T>::read(int direction, int first, int count, Strip<T>& strip) c
     } else {
         for (Line<T>& line : strip.lines) place(line);
         if (direction == rows_bit)
-            for (Line<T>& line : strip.lines) line.y = image_.ordinate + line.path.pixel(0, image_.cols);
+            take_rows(strip);
         else
             turn_rows(strip);
     }
@@ -94,6 +94,20 @@ void LineReader<T>::read(int direction, int first, int count, Strip<T>& strip) c
     for (Line<T>& line : strip.lines) {
         set_tolerance(line, strip.scale.data() + used);
         used += static_cast<std::size_t>(line.path.size);
+    }
+}
+
+// Rows lie in the image as they are; the last ones are copied, since nothing may be read beyond the image.
+template <class T>
+void LineReader<T>::take_rows(Strip<T>& strip) const {
+    const auto pitch = static_cast<std::size_t>(image_.cols + padding);
+    strip.y.resize(pitch * strip.lines.size());
+    T* copy = strip.y.data();
+    for (Line<T>& line : strip.lines) {
+        line.y = image_.ordinate + line.path.pixel(0, image_.cols);
+        if (static_cast<std::int64_t>(image_.rows - 1 - line.path.row) * image_.cols >= padding) continue;
+        line.y = std::copy_n(line.y, image_.cols, copy) - image_.cols;
+        copy += pitch;
     }
 }
 
@@ -110,7 +124,7 @@ void LineReader<T>::turn_rows(Strip<T>& strip) const {
     const int height = std::min(down > 0 ? image_.rows - top : top + 1, slant ? image_.cols - left : image_.rows);
     // Next samples of all lines lie in different sets of any cache.
     const int pitch = (height + 1023) / 1024 * 1024 + 16;
-    strip.y.resize(static_cast<std::size_t>(pitch) * strip.lines.size());
+    strip.y.resize(static_cast<std::size_t>(pitch) * strip.lines.size() + padding);
     for (int k = 0; k < height; ++k) {
         const int col = left + slant * k;
         const auto source = static_cast<std::int64_t>(top + down * k) * image_.cols + col;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "edges.hpp"
+#include "simd.hpp"
 
 namespace rangeedge {
 
@@ -42,7 +43,7 @@ template <class T>
 struct Line {
     Path path{};
     int cols = 0;
-    const T* y = nullptr;
+    const T* y = nullptr;      // `padding` more samples than the path has may be read
     const T* x = nullptr;      // null where samples are one unit apart
     const T* scale = nullptr;  // inverse tolerances, where they differ
     bool projective = false;
@@ -95,6 +96,7 @@ public:
 
 private:
     void place(Line<T>& line) const;
+    void take_rows(Strip<T>& strip) const;
     void turn_rows(Strip<T>& strip) const;
     void read_points(Line<T>& line, T* x, T* y) const;
     void set_tolerance(Line<T>& line, T* scale) const;

@@ -51,8 +51,7 @@ Worst<T> worst_of(const Run<T>& run, const ThreePoint<T>& curve, int first, int 
     return worst;
 }
 
-// The same for sixteen or more samples one unit apart, sixteen at a time: each lane keeps its own worst. The last
-// sixteen overlap those before them, which changes nothing.
+// The same for samples one unit apart, sixteen at a time: each lane keeps its own worst.
 template <int bytes>
 RANGEEDGE_INLINE Worst<float> worst_of_lanes_in(const float* y, const float* scale, const ThreePoint<float>& curve,
                                                 int first, int last) {
@@ -62,11 +61,11 @@ RANGEEDGE_INLINE Worst<float> worst_of_lanes_in(const float* y, const float* sca
     const auto midpoint = static_cast<int>(curve.origin);
     F worst = F::all(-1);
     I at = I::all(first);
-    for (int next = first; next < last; next += F::count) {
-        const int k = std::min(next, last - F::count);
+    for (int k = first; k < last; k += F::count) {
         const F t = F::from(static_cast<float>(k - midpoint));
         F r = magnitude(F::load(y + k) - (ym + t * (b + a * t)));
         if (scale) r *= F::load(scale + k);
+        r = first_lanes(r, last - k);
         const I index = I::from(k);
         for (int p = 0; p < F::parts; ++p) {
             const auto larger = r.part[p] > worst.part[p];
@@ -89,7 +88,7 @@ Worst<T> worst_sample(const Run<T>& run, const Segment& s) {
     const ThreePoint<T> curve(run, s);
     const int first = s.first + 1;
     if constexpr (std::is_same_v<T, float>)
-        if (!run.x && s.last - first >= 16) return worst_of_lanes(run.y, run.scale, curve, first, s.last);
+        if (!run.x) return worst_of_lanes(run.y, run.scale, curve, first, s.last);
     return worst_of(run, curve, first, s.last);
 }
 

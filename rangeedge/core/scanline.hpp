@@ -13,7 +13,8 @@ struct Segment {
 };
 
 // One run of valid samples. `x` is null where samples are one unit apart, else strictly increasing.
-// `scale` is null where one tolerance holds for the whole run, else it multiplies each residual.
+// `scale` is null where one tolerance holds for the whole run, else it multiplies each residual. Of `y` and `scale`
+// a few samples beyond the last one may be read.
 template <class T>
 struct Run {
     const T* y;

@@ -1,7 +1,10 @@
 // Loops over many lanes, written once for every width of vector that processors have.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
+#include <cstdint>
 #include <cstring>
+#include <type_traits>
 
 #define RANGEEDGE_ALWAYS __attribute__((always_inline))  // of lambdas: out of line they would be narrow
 #define RANGEEDGE_INLINE inline RANGEEDGE_ALWAYS
@@ -24,6 +27,9 @@
 #endif
 
 namespace rangeedge {
+
+// How many samples beyond a line's end loops in lanes may read.
+constexpr int padding = 16;
 
 // 64 bytes of T (float, int or double), in vectors of `bytes` bytes. Neither what a lane holds nor the order in which
 // lanes are joined depends on that width.
@@ -121,6 +127,21 @@ RANGEEDGE_INLINE Floats<bytes> from_bits(const Ints<bytes>& a) {
 template <int bytes>
 RANGEEDGE_INLINE Floats<bytes> magnitude(const Floats<bytes>& a) {
     return from_bits(bits(a) & Ints<bytes>::all(0x7fffffff));
+}
+
+// The first n lanes, and 0 in the others.
+template <class T, int bytes>
+RANGEEDGE_INLINE Lanes<T, bytes> first_lanes(const Lanes<T, bytes>& a, int n) {
+    typedef std::conditional_t<sizeof(T) == 4, std::int32_t, std::int64_t> Bits;
+    using M = Lanes<Bits, bytes>;
+    constexpr int count = M::count;
+    alignas(64) static constexpr Bits kept[32] = {-1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
+    M m;
+    std::memcpy(&m, &a, sizeof m);
+    m &= M::load(kept + 16 - std::min(n, count));
+    Lanes<T, bytes> r;
+    std::memcpy(&r, &m, sizeof r);
+    return r;
 }
 
 // All bits where a < 0, else none.
