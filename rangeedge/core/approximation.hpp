@@ -1,6 +1,7 @@
 // A scan line as a sequence of segments, each with its curve.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstddef>
 #include <vector>
 
 #include "fit.hpp"
@@ -14,15 +15,54 @@ struct Approximation {
     std::vector<Curve> curves;
 };
 
-// A segment while segments are joined: a linked list, of which the first one stays.
-template <class Sums>
-struct Piece {
-    Segment segment;
-    int previous, next;
-    Sums sums;
-    double least;    // significance of a quadratic term, in the unit of the ordinates
-    double squares;  // of the residuals
-    double cost;     // of taking back the cut on the right
+// Segments while they are joined: a linked list, of which the first one stays. Numbers of all are kept apart, to be
+// computed side by side; there is room for a few more.
+struct Pieces {
+    struct Link {
+        Segment segment;
+        int previous, next;
+    };
+    std::vector<Link> links;
+    std::vector<double> sigma;     // of the noise where the segment ends, 0 where the next one is not adjacent
+    std::vector<double> least;     // significance of a quadratic term, in the unit of the ordinates
+    std::vector<double> residual;  // sum of squares
+    std::vector<double> cost;      // of taking back the cut on the right
+
+    void resize(std::size_t count, std::size_t room) {
+        links.resize(count);
+        for (auto* numbers : {&sigma, &least, &residual, &cost}) numbers->resize(room);
+    }
+};
+
+// Sums over the segments: of samples one unit apart, and of others.
+class EvenPieces : public Pieces {
+public:
+    Projections sums(int i) const;
+    void set_sums(int i, const Projections& p);
+    template <class T>
+    static Projections sums_over(const Line<T>& line, const Segment& s);
+    template <class T>
+    void fit(const Line<T>& line);
+    void price();
+    Curve curve(int i) const;
+
+private:
+    std::vector<double> n_, base_, mean_, y1_, y2_, squares_;
+};
+
+class UnevenPieces : public Pieces {
+public:
+    const Moments& sums(int i) const { return sums_[static_cast<std::size_t>(i)]; }
+    void set_sums(int i, const Moments& moments) { sums_[static_cast<std::size_t>(i)] = moments; }
+    template <class T>
+    static Moments sums_over(const Line<T>& line, const Segment& s);
+    template <class T>
+    void fit(const Line<T>& line);
+    void price();
+    Curve curve(int i) const;
+
+private:
+    std::vector<Moments> sums_;
 };
 
 // A segment that may be joined with the next one, and what that costs.
@@ -33,27 +73,28 @@ struct Join {
     bool operator<(const Join& other) const { return cost != other.cost ? cost > other.cost : left > other.left; }
 };
 
-// Approximates line after line; what it needs for that is reused.
+// Approximates the lines of one strip after the other; what it needs for that is reused.
 template <class T>
 class Approximator {
 public:
     explicit Approximator(const Parameters& parameters) : parameters_(parameters) {}
 
-    // Splits the line (section 4.1), fits a curve to every segment (4.2, end), takes back cuts that the noise
-    // explains, and gives segments that lie across an edge to the surfaces beside it. Holds until the next call.
-    const Approximation& approximate(const Line<T>& line);
+    // Splits the lines (section 4.1).
+    void split(const Strip<T>& strip);
+    // Fits a curve to every segment of the i-th line (4.2, end), takes back cuts that the noise explains, and gives
+    // segments that lie across an edge to the surfaces beside it. Holds until the next call.
+    const Approximation& approximate(const Strip<T>& strip, std::size_t i);
 
 private:
-    void split(const Line<T>& line);
     void interpolate(const Line<T>& line);
-    template <class Sums>
-    void fit(const Line<T>& line, std::vector<Piece<Sums>>& pieces);
+    template <class P>
+    void fit(const Line<T>& line, P& pieces);
 
     Parameters parameters_;
+    Splitter<T> splitter_;
     Approximation result_;
-    std::vector<Segment> pending_;
-    std::vector<Piece<Projections>> even_;  // of samples one unit apart
-    std::vector<Piece<Moments>> uneven_;
+    EvenPieces even_;
+    UnevenPieces uneven_;
     std::vector<Join> cheap_;
 };
 

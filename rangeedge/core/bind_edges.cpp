@@ -55,15 +55,15 @@ nb::dict columns(const std::vector<Candidate>& candidates) {
 
 template <class T>
 nb::ndarray<nb::numpy, int> split_scan_line(In<T> y, std::optional<In<T>> x, double eps) {
-    std::vector<Segment> pending, segments;
+    std::vector<Segment> segments;
     {
         nb::gil_scoped_release release;
         std::vector<T> samples(y.data(), y.data() + y.size());
         samples.resize(y.size() + padding);
-        const T* abscissa = x ? x->data() : nullptr;
-        for_each_run(samples.data(), abscissa, static_cast<int>(y.size()), [&](int first, int last) {
-            split_run(Run<T>{samples.data(), abscissa, nullptr, first, last}, static_cast<T>(eps), pending, segments);
-        });
+        Splitter<T> splitter;
+        splitter.add({samples.data(), x ? x->data() : nullptr, nullptr, static_cast<int>(y.size()), static_cast<T>(eps)});
+        splitter.split();
+        splitter.for_each_segment(0, [&](const Segment& s) { segments.push_back(s); });
     }
     return handed_over<int>(std::move(segments));
 }

@@ -35,8 +35,14 @@ public:
 
     void read(int first, int count, Strip<T>& strip) const { reader_.read(direction_, first, count, strip); }
 
-    void detect(const Line<T>& line, Approximator<T>& approximator, std::vector<Candidate>& candidates) const {
-        const Approximation& a = approximator.approximate(line);  // P 4.1
+    void detect(const Strip<T>& strip, Approximator<T>& approximator, std::vector<Candidate>& candidates) const {
+        approximator.split(strip);  // P 4.1
+        for (std::size_t i = 0; i < strip.lines.size(); ++i)
+            detect(strip.lines[i], approximator.approximate(strip, i), candidates);
+    }
+
+private:
+    void detect(const Line<T>& line, const Approximation& a, std::vector<Candidate>& candidates) const {
         for (std::size_t i = 0; i + 1 < a.segments.size(); ++i) {
             if (a.segments[i + 1].first - a.segments[i].last - 1 > parameters_.max_gap) continue;
             const Cut cut = adapted_position(line, a, i);                                    // P 4.2, Fig. 5
@@ -45,7 +51,6 @@ public:
         }
     }
 
-private:
     // The intersection of the two curves nearest the cut becomes the edge position if it is within reach and the
     // samples it passes over fit the curve to which they then belong.
     Cut adapted_position(const Line<T>& line, const Approximation& a, std::size_t i) const {
@@ -158,7 +163,7 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
             Part& part = parts[i];
             const LineDetector<T> detector(image, noise, parameters, part.direction);
             detector.read(part.first, part.count, strip);
-            for (const Line<T>& line : strip.lines) detector.detect(line, approximator, part.found);
+            detector.detect(strip, approximator, part.found);
         }
     });
     std::vector<Candidate> candidates;

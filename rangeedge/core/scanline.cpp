@@ -10,19 +10,22 @@
 namespace rangeedge {
 namespace {
 
+constexpr int exact = 3;  // samples that a quadratic passes through
+
 // The quadratic through both end points and the midpoint, y = ym + t (b + a t) with t counted from the midpoint.
 template <class T>
 struct ThreePoint {
+    int m;
     T origin, ym, a, b;
 
-    ThreePoint(const Run<T>& run, const Segment& s) {
-        const int m = s.first + (s.last - s.first) / 2;
-        const T left = run.x ? run.x[m] - run.x[s.first] : static_cast<T>(m - s.first);
-        const T right = run.x ? run.x[s.last] - run.x[m] : static_cast<T>(s.last - m);
-        const T slope_left = (run.y[m] - run.y[s.first]) / left;
-        const T slope_right = (run.y[s.last] - run.y[m]) / right;
-        origin = run.x ? run.x[m] : static_cast<T>(m);
-        ym = run.y[m];
+    ThreePoint(const Samples<T>& line, const Segment& s) {
+        m = s.first + (s.last - s.first) / 2;
+        const T left = line.x ? line.x[m] - line.x[s.first] : static_cast<T>(m - s.first);
+        const T right = line.x ? line.x[s.last] - line.x[m] : static_cast<T>(s.last - m);
+        const T slope_left = (line.y[m] - line.y[s.first]) / left;
+        const T slope_right = (line.y[s.last] - line.y[m]) / right;
+        origin = line.x ? line.x[m] : static_cast<T>(m);
+        ym = line.y[m];
         a = (slope_right - slope_left) / (left + right);
         b = slope_left + a * left;
     }
@@ -32,20 +35,13 @@ struct ThreePoint {
     }
 };
 
-// Where the residual is largest, and how large; the first of equals.
 template <class T>
-struct Worst {
-    T residual;
-    int at;
-};
-
-// Over samples first .. last - 1.
-template <class T>
-Worst<T> worst_of(const Run<T>& run, const ThreePoint<T>& curve, int first, int last) {
-    Worst<T> worst{-1, first};
-    for (int k = first; k < last; ++k) {
-        T r = curve.residual(run.x ? run.x[k] : static_cast<T>(k), run.y[k]);
-        if (run.scale) r *= run.scale[k];
+typename Splitter<T>::Worst worst_of(const Samples<T>& line, const Segment& s) {
+    const ThreePoint<T> curve(line, s);
+    typename Splitter<T>::Worst worst{-1, s.first + 1};
+    for (int k = s.first + 1; k < s.last; ++k) {
+        T r = curve.residual(line.x ? line.x[k] : static_cast<T>(k), line.y[k]);
+        if (line.scale) r *= line.scale[k];
         if (r > worst.residual) worst = {r, k};
     }
     return worst;
@@ -53,68 +49,103 @@ Worst<T> worst_of(const Run<T>& run, const ThreePoint<T>& curve, int first, int 
 
 // The same for samples one unit apart, sixteen at a time: each lane keeps its own worst.
 template <int bytes>
-RANGEEDGE_INLINE Worst<float> worst_of_lanes_in(const float* y, const float* scale, const ThreePoint<float>& curve,
-                                                int first, int last) {
+RANGEEDGE_INLINE Splitter<float>::Worst worst_in_lanes(const Samples<float>& line, const Segment& s) {
     using F = Floats<bytes>;
     using I = Ints<bytes>;
+    const ThreePoint<float> curve(line, s);
     const F ym = F::all(curve.ym), a = F::all(curve.a), b = F::all(curve.b);
-    const auto midpoint = static_cast<int>(curve.origin);
     F worst = F::all(-1);
-    I at = I::all(first);
-    for (int k = first; k < last; k += F::count) {
-        const F t = F::from(static_cast<float>(k - midpoint));
-        F r = magnitude(F::load(y + k) - (ym + t * (b + a * t)));
-        if (scale) r *= F::load(scale + k);
-        r = first_lanes(r, last - k);
+    I at = I::all(s.last);
+    const auto look = [&](int k, int count) RANGEEDGE_ALWAYS {
+        const F t = F::from(static_cast<float>(k - curve.m));
+        F r = magnitude(F::load(line.y + k) - (ym + t * (b + a * t)));
+        if (line.scale) r *= F::load(line.scale + k);
+        if (count < F::count) r = first_lanes(r, count);
         const I index = I::from(k);
         for (int p = 0; p < F::parts; ++p) {
             const auto larger = r.part[p] > worst.part[p];
             worst.part[p] = larger ? r.part[p] : worst.part[p];
             at.part[p] = larger ? index.part[p] : at.part[p];
         }
-    }
+    };
+    int k = s.first + 1;
+    for (; k + F::count <= s.last; k += F::count) look(k, F::count);
+    if (k < s.last) look(k, s.last - k);
     // Across the lanes, without branches: which is the worst cannot be foretold.
-    const float most = worst.joined([](float p, float q) { return p > q ? p : q; });
-    const I beyond = I::all(last);
-    for (int p = 0; p < F::parts; ++p) at.part[p] = worst.part[p] == most ? at.part[p] : beyond.part[p];
-    return {most, at.joined([](int p, int q) { return p < q ? p : q; })};
+    const float most = worst.joined([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; });
+    const F all_most = F::all(most);
+    const I beyond = I::all(s.last);
+    for (int p = 0; p < F::parts; ++p) at.part[p] = worst.part[p] == all_most.part[p] ? at.part[p] : beyond.part[p];
+    return {most, at.joined([](auto p, auto q) RANGEEDGE_ALWAYS { return p < q ? p : q; })};
 }
-RANGEEDGE_VERSIONS(Worst<float>, worst_of_lanes,
-                   (const float* y, const float* scale, const ThreePoint<float>& curve, int first, int last),
-                   (y, scale, curve, first, last))
 
-template <class T>
-Worst<T> worst_sample(const Run<T>& run, const Segment& s) {
-    const ThreePoint<T> curve(run, s);
-    const int first = s.first + 1;
-    if constexpr (std::is_same_v<T, float>)
-        if (!run.x) return worst_of_lanes(run.y, run.scale, curve, first, s.last);
-    return worst_of(run, curve, first, s.last);
+// Of `count` pending nodes. Lines without abscissae.
+template <int bytes>
+RANGEEDGE_INLINE void find_worst_in(const Samples<float>* lines, const Splitter<float>::Node* nodes, const int* pending,
+                                    std::size_t count, Splitter<float>::Worst* worst) {
+    for (std::size_t i = 0; i < count; ++i) {
+        const Splitter<float>::Node& node = nodes[pending[i]];
+        worst[i] = worst_in_lanes<bytes>(lines[node.line], node.segment);
+    }
 }
+RANGEEDGE_VERSIONS(void, find_worst,
+                   (const Samples<float>* lines, const Splitter<float>::Node* nodes, const int* pending,
+                    std::size_t count, Splitter<float>::Worst* worst),
+                   (lines, nodes, pending, count, worst))
 
 }  // namespace
 
 template <class T>
-void split_run(const Run<T>& run, T eps, std::vector<Segment>& pending, std::vector<Segment>& segments) {
-    pending.push_back({run.first, run.last});
-    while (!pending.empty()) {
-        const Segment s = pending.back();
-        pending.pop_back();
-        const Worst<T> worst = s.size() > 3 ? worst_sample(run, s) : Worst<T>{0, s.first};
-        if (!(worst.residual > eps)) {
-            segments.push_back(s);
-            continue;
+void Splitter<T>::clear() {
+    lines_.clear();
+    nodes_.clear();
+    heads_.clear();
+    pending_.clear();
+}
+
+template <class T>
+void Splitter<T>::add(const Samples<T>& line) {
+    const int own = static_cast<int>(lines_.size());
+    lines_.push_back(line);
+    heads_.push_back(-1);
+    for_each_run(line.y, line.x, line.size, [&](int first, int last) {
+        const int node = static_cast<int>(nodes_.size());
+        (heads_.back() < 0 ? heads_.back() : nodes_.back().next) = node;
+        nodes_.push_back({{first, last}, own, -1});
+        if (last - first >= exact) pending_.push_back(node);
+    });
+}
+
+template <class T>
+void Splitter<T>::split() {
+    for (; !pending_.empty(); pending_.swap(following_)) {
+        worst_.resize(pending_.size());
+        if constexpr (std::is_same_v<T, float>) {
+            if (!lines_.front().x) find_worst(lines_.data(), nodes_.data(), pending_.data(), pending_.size(), worst_.data());
         }
-        // The cut falls between two samples; the extreme one joins the neighbour it is closer to.
-        const int k = worst.at;
-        const bool joins_left = std::abs(run.y[k] - run.y[k - 1]) <= std::abs(run.y[k + 1] - run.y[k]);
-        const int cut = joins_left ? k : k - 1;
-        pending.push_back({cut + 1, s.last});
-        pending.push_back({s.first, cut});
+        if (!std::is_same_v<T, float> || lines_.front().x)
+            for (std::size_t i = 0; i < pending_.size(); ++i) {
+                const Node& node = nodes_[static_cast<std::size_t>(pending_[i])];
+                worst_[i] = worst_of(lines_[static_cast<std::size_t>(node.line)], node.segment);
+            }
+        following_.clear();
+        for (std::size_t i = 0; i < pending_.size(); ++i) {
+            const Node node = nodes_[static_cast<std::size_t>(pending_[i])];
+            const Samples<T>& line = lines_[static_cast<std::size_t>(node.line)];
+            if (!(worst_[i].residual > line.eps)) continue;
+            // The cut falls between two samples; the extreme one joins the neighbour it is closer to.
+            const int k = worst_[i].at;
+            const bool joins_left = std::abs(line.y[k] - line.y[k - 1]) <= std::abs(line.y[k + 1] - line.y[k]);
+            const int cut = joins_left ? k : k - 1, right = static_cast<int>(nodes_.size());
+            nodes_.push_back({{cut + 1, node.segment.last}, node.line, node.next});
+            nodes_[static_cast<std::size_t>(pending_[i])] = {{node.segment.first, cut}, node.line, right};
+            if (cut - node.segment.first >= exact) following_.push_back(pending_[i]);
+            if (node.segment.last - cut > exact) following_.push_back(right);
+        }
     }
 }
 
-template void split_run(const Run<float>&, float, std::vector<Segment>&, std::vector<Segment>&);
-template void split_run(const Run<double>&, double, std::vector<Segment>&, std::vector<Segment>&);
+template class Splitter<float>;
+template class Splitter<double>;
 
 }  // namespace rangeedge

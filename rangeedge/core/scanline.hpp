@@ -12,22 +12,6 @@ struct Segment {
     int size() const { return last - first + 1; }
 };
 
-// One run of valid samples. `x` is null where samples are one unit apart, else strictly increasing.
-// `scale` is null where one tolerance holds for the whole run, else it multiplies each residual. Of `y` and `scale`
-// a few samples beyond the last one may be read.
-template <class T>
-struct Run {
-    const T* y;
-    const T* x;
-    const T* scale;
-    int first, last;
-};
-
-// Splits a run into segments whose residuals against the quadratic through both end points and the midpoint
-// stay within `eps`; appends them to `segments` in order. `pending` is scratch, left empty.
-template <class T>
-void split_run(const Run<T>& run, T eps, std::vector<Segment>& pending, std::vector<Segment>& segments);
-
 // The first sample at or after k, and before n, that is valid or is not; else n. NaN marks a sample without data.
 template <bool valid, class T>
 int find(const T* y, int k, int n) {
@@ -63,5 +47,52 @@ void for_each_run(const T* y, const T* x, int n, Visit&& visit) {
         }
     }
 }
+
+// The samples of one scan line. `x` is null where they are one unit apart; `scale` is null where one tolerance holds for
+// all, else it multiplies each residual. Of `y` and `scale` `padding` samples beyond the last one may be read.
+template <class T>
+struct Samples {
+    const T* y;
+    const T* x;
+    const T* scale;
+    int size;
+    T eps;
+};
+
+// Splits runs of valid samples into segments whose residuals against the quadratic through both end points and the
+// midpoint stay within `eps`. Lines are split together, all segments of one generation in turn, so that a processor
+// works on several at a time. What it needs is reused.
+template <class T>
+class Splitter {
+public:
+    void clear();
+    void add(const Samples<T>& line);
+    void split();
+
+    // Calls visit(segment) in order for those of the i-th line that was added.
+    template <class Visit>
+    void for_each_segment(std::size_t i, Visit&& visit) const {
+        for (int k = heads_[i]; k >= 0; k = nodes_[static_cast<std::size_t>(k)].next)
+            visit(nodes_[static_cast<std::size_t>(k)].segment);
+    }
+
+    // A segment, its line, and the next segment there or -1.
+    struct Node {
+        Segment segment;
+        int line, next;
+    };
+    // Where the residual is largest, and how large; the first of equals.
+    struct Worst {
+        T residual;
+        int at;
+    };
+
+private:
+    std::vector<Samples<T>> lines_;
+    std::vector<Node> nodes_;
+    std::vector<int> heads_;               // nodes
+    std::vector<int> pending_, following_;  // nodes of this generation, and of the next one
+    std::vector<Worst> worst_;             // of those pending
+};
 
 }  // namespace rangeedge

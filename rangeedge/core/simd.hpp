@@ -71,24 +71,36 @@ struct Lanes {
     RANGEEDGE_OPERATOR(^)
 #undef RANGEEDGE_OPERATOR
 
-    // Joins the lanes two by two: each one of the first half with that of the second half, and so on.
+    // Joins the lanes two by two, each one of the first half with that of the second half, and so on. `join` takes
+    // vectors as well as numbers.
     template <class Join>
     RANGEEDGE_INLINE T joined(Join&& join) const {
-        T values[count];
-        store(values);
-        join_halves<count / 2>(values, join);
-        return values[0];
+        Lanes r = *this;
+        for (int half = parts / 2; half > 0; half /= 2)
+            for (int p = 0; p < half; ++p) r.part[p] = join(r.part[p], r.part[p + half]);
+        return joined_halves<bytes>(r.part[0], join);
     }
     RANGEEDGE_INLINE T sum() const {
-        return joined([](T a, T b) { return a + b; });
+        return joined([](auto a, auto b) RANGEEDGE_ALWAYS { return a + b; });
     }
 
 private:
-    template <int half, class Join>
-    static RANGEEDGE_INLINE void join_halves(T* values, Join&& join) {
-        for (int i = 0; i < half; ++i) values[i] = join(values[i], values[i + half]);
-        if constexpr (half > 1) join_halves<half / 2>(values, join);
+    template <int size, class Join>
+    static RANGEEDGE_INLINE T joined_halves(const Vector& v, Join&& join) {
+        if constexpr (size > 16) {
+            typedef Lanes<T, size / 2> Half;
+            typename Half::Vector low, high;
+            std::memcpy(&low, &v, sizeof low);
+            std::memcpy(&high, reinterpret_cast<const char*>(&v) + sizeof low, sizeof high);
+            return Half::template joined_halves<size / 2>(join(low, high), join);
+        } else if constexpr (width == 4) {
+            return join(join(v[0], v[2]), join(v[1], v[3]));
+        } else {
+            return join(v[0], v[1]);
+        }
     }
+    template <class, int>
+    friend struct Lanes;
 };
 
 // Sixteen floats or ints, eight doubles.
