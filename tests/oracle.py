@@ -390,26 +390,28 @@ class Detector:
         return least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
 
     def _merged(self, line, segments):
+        """In every round, cuts that cost less than those beside them are taken back."""
         limit = self.p.mergeSignificance**2
-        while len(segments) > 1:
-            costs, unions = [], []
-            for left, right in pairwise(segments):
-                union = Segment(left.first, right.last)
-                sigma = line.sigma[left.last]
-                k = np.arange(union.first, union.last + 1)
-                if _adjacent(line, left, right):
-                    one = least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
-                    rise = one.sum_squares - left.curve.sum_squares - right.curve.sum_squares
-                    costs.append(rise / sigma**2)
-                else:
-                    costs.append(math.inf)
-                unions.append(union)
-            i = int(np.argmin(costs))
-            if not costs[i] < limit:
-                break
-            unions[i].curve = self._fit(line, unions[i])
-            segments = [*segments[:i], unions[i], *segments[i + 2 :]]
-        return segments
+        while True:
+            costs = [self._cost(line, *pair) for pair in pairwise(segments)]
+            around = [math.inf, *costs, math.inf]
+            chosen = [
+                i for i, cost in enumerate(costs) if cost < limit and cost < around[i] and cost <= around[i + 2]
+            ]
+            if not chosen:
+                return segments
+            for i in reversed(chosen):
+                union = Segment(segments[i].first, segments[i + 1].last)
+                union.curve = self._fit(line, union)
+                segments = [*segments[:i], union, *segments[i + 2 :]]
+
+    def _cost(self, line, left, right):
+        """By how much one curve for both raises the sum of squared residuals, in variances of the noise."""
+        if not _adjacent(line, left, right):
+            return math.inf
+        k, sigma = np.arange(left.first, right.last + 1), line.sigma[left.last]
+        one = least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
+        return (one.sum_squares - left.curve.sum_squares - right.curve.sum_squares) / sigma**2
 
     def _dissolved(self, line, segments):
         segments = list(segments)

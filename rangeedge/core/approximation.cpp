@@ -13,7 +13,9 @@ namespace {
 constexpr double curved_significance = 5;  // of the quadratic term of a least-squares fit
 constexpr double straddling = 2;           // how much more, in significance, a segment across an edge may cost
 constexpr int none = -1;
-constexpr std::size_t lanes = 8;  // of doubles
+
+// As many numbers, or a few more, as are computed side by side.
+std::size_t in_lanes(std::size_t count) { return (count + 7) / 8 * 8; }
 
 // Sums of n >= 1 samples one unit apart, h = y - base, t counted from the first one.
 struct Sums {
@@ -62,81 +64,104 @@ double cost_of(double residual, double left, double right, double sigma) {
     return sigma > 0 ? (residual - left - right) / (sigma * sigma) : HUGE_VAL;
 }
 
-// The i-th of `count` segments gets its projections, in place of its sums, and the squares of its residuals.
+// Each of `count` segments gets its projections in place of its sums, and the squares of its residuals.
 RANGEEDGE_WIDE
-void project(std::size_t count, const double* n, const double* base, const double* least, double* h, double* ht,
-             double* htt, double* hh, double* residual) {
-    // One after the other: mean, y1, y2, squares.
+void project(std::size_t count, const double* n, const double* base, const double* least, double* h_mean, double* ht_y1,
+             double* htt_y2, double* hh_squares, double* residual) {
 #pragma GCC ivdep
     for (std::size_t i = 0; i < count; ++i) {
-        const Projections p = projections_of(n[i], base[i], {h[i], ht[i], htt[i], hh[i]});
-        h[i] = p.mean, ht[i] = p.y1, htt[i] = p.y2, hh[i] = p.squares;
+        const Projections p = projections_of(n[i], base[i], {h_mean[i], ht_y1[i], htt_y2[i], hh_squares[i]});
+        h_mean[i] = p.mean, ht_y1[i] = p.y1, htt_y2[i] = p.y2, hh_squares[i] = p.squares;
         residual[i] = residual_squares(p, least[i]);
     }
 }
 
-// What it costs to join the i-th segment with the next one.
+// Columns of numbers, one a segment.
+struct Columns {
+    const double *n, *mean, *y1, *y2, *squares, *residual;
+    Projections operator[](std::size_t i) const { return {n[i], mean[i], y1[i], y2[i], squares[i]}; }
+};
+
+// What it costs to join each one on the left with that on the right.
 RANGEEDGE_WIDE
-void price_all(std::size_t count, const double* n, const double* mean, const double* y1, const double* y2,
-               const double* squares, const double* residual, const double* sigma, double* cost) {
+void cost_all(std::size_t count, const Columns left, const Columns right, const double* sigma, double* cost) {
 #pragma GCC ivdep
     for (std::size_t i = 0; i < count; ++i) {
-        const Projections a{n[i], mean[i], y1[i], y2[i], squares[i]};
-        const Projections b{n[i + 1], mean[i + 1], y1[i + 1], y2[i + 1], squares[i + 1]};
-        const double one = residual_squares(joined(a, b), curved_significance * sigma[i]);
-        cost[i] = cost_of(one, residual[i], residual[i + 1], sigma[i]);
+        const double one = residual_squares(joined(left[i], right[i]), curved_significance * sigma[i]);
+        cost[i] = cost_of(one, left.residual[i], right.residual[i], sigma[i]);
     }
 }
 
-// Joins the segments of one line.
+// Joins segments.
 template <class T, class P>
 class Joiner {
 public:
-    Joiner(const Line<T>& line, const Parameters& parameters, P& pieces, std::vector<Join>& cheap)
-        : line_(line), limit_(parameters.merge_significance * parameters.merge_significance), pieces_(pieces),
-          cheap_(cheap) {}
+    Joiner(const std::vector<Line<T>>& lines, double limit, P& pieces, std::vector<int>& cuts, std::vector<int>& chosen)
+        : lines_(lines), limit_(limit), pieces_(pieces), cuts_(cuts), chosen_(chosen) {}
 
-    // Takes back cuts, the least significant first, until each one left lowers the sum of squares enough.
+    // Takes back cuts until each one left lowers the sum of squares enough: in every round those that cost less than
+    // the cuts beside them.
     void merge() {
-        pieces_.price();
-        for (int i = 0; i != none; i = next(i)) offer(i);
-        while (!cheap_.empty()) {
-            const Join cheapest = cheap_.front();
-            std::pop_heap(cheap_.begin(), cheap_.end());
-            cheap_.pop_back();
-            const int i = cheapest.left, right = next(i);
-            if (cost(i) != cheapest.cost) continue;  // it has changed since
-            const auto sums = joined(pieces_.sums(i), pieces_.sums(right));
-            segment(i).last = segment(right).last;
-            sigma(i) = sigma(right);
-            take(i, sums, sigma_of(segment(i)));
-            cost(right) = HUGE_VAL;
-            remove(right);
-            price(i);
-            if (previous(i) != none) price(previous(i));
+        pieces_.price_all();
+        cuts_.clear();
+        for (int i = 0; i != none; i = next(i)) cuts_.push_back(i);
+        while (!cuts_.empty()) {
+            chosen_.clear();
+            for (const int i : cuts_) {
+                if (chosen(i) || !is_cheapest(i)) continue;
+                chosen(i) = true;
+                chosen_.push_back(i);
+            }
+            for (const int i : chosen_) {
+                const int right = next(i);
+                segment(i).last = segment(right).last;
+                sigma(i) = sigma(right);
+                set_sums(i, joined(pieces_.sums(i), pieces_.sums(right)), sigma_of(i));
+                remove(right);
+            }
+            cuts_.clear();
+            for (const int i : chosen_) {
+                cuts_.push_back(i);
+                if (previous(i) != none && !chosen(previous(i))) cuts_.push_back(previous(i));
+            }
+            pieces_.price(cuts_);
+            for (const int i : chosen_) chosen(i) = false;
+            // These and the cuts beside them may be cheapest now.
+            for (std::size_t k = cuts_.size(); k-- > 0;)
+                for (const int beside : {previous(cuts_[k]), next(cuts_[k])})
+                    if (beside != none) cuts_.push_back(beside);
         }
     }
 
     // Splitting may leave a segment across an edge, its rounding included, where one cut would do. It is taken out
     // where the curves beside it meet within it and, given its samples, explain them nearly as well.
-    void dissolve() {
+    void dissolve(std::vector<Curve>& curves) {
         for (int i = next(0); i != none && next(i) != none;) {
             const int before = previous(i), after = next(i);
-            i = !dissolved(i) || previous(before) == none ? after : before;
+            i = !dissolved(i, curves) || previous(before) == none ? after : before;
         }
     }
 
 private:
-    typename P::Link& link(int i) { return pieces_.links[static_cast<std::size_t>(i)]; }
+    Pieces::Link& link(int i) { return pieces_.links[static_cast<std::size_t>(i)]; }
     int& previous(int i) { return link(i).previous; }
     int& next(int i) { return link(i).next; }
+    bool& chosen(int i) { return link(i).chosen; }
     Segment& segment(int i) { return link(i).segment; }
     double& sigma(int i) { return pieces_.sigma[static_cast<std::size_t>(i)]; }
     double& residual(int i) { return pieces_.residual[static_cast<std::size_t>(i)]; }
     double& cost(int i) { return pieces_.cost[static_cast<std::size_t>(i)]; }
+    const Line<T>& line_of(int i) { return lines_[static_cast<std::size_t>(link(i).line)]; }
+    double sigma_of(int i) { return line_of(i).sigma_at(middle(segment(i))); }
+
+    // Of equals the leftmost.
+    bool is_cheapest(int i) {
+        return cost(i) < limit_ && (previous(i) == none || cost(i) < cost(previous(i))) &&
+               (next(i) == none || cost(i) <= cost(next(i)));
+    }
 
     template <class Sums>
-    void take(int i, const Sums& sums, double sigma) {
+    void set_sums(int i, const Sums& sums, double sigma) {
         const double least = curved_significance * sigma;
         pieces_.set_sums(i, sums);
         pieces_.least[static_cast<std::size_t>(i)] = least;
@@ -148,64 +173,49 @@ private:
         if (next(i) != none) previous(next(i)) = previous(i);
     }
 
-    void price(int i) {
-        const int right = next(i);
-        cost(i) = HUGE_VAL;
-        if (right == none || !(sigma(i) > 0)) return;
-        const double one = residual_squares(joined(pieces_.sums(i), pieces_.sums(right)), curved_significance * sigma(i));
-        cost(i) = cost_of(one, residual(i), residual(right), sigma(i));
-        offer(i);
-    }
-
-    void offer(int i) {
-        if (!(cost(i) < limit_)) return;
-        cheap_.push_back({cost(i), i});
-        std::push_heap(cheap_.begin(), cheap_.end());
-    }
-
-    bool dissolved(int i) {
-        const Segment s = segment(i);
+    bool dissolved(int i, std::vector<Curve>& curves) {
         const int before = previous(i), after = next(i);
         if (!(sigma(before) > 0 && sigma(i) > 0)) return false;  // not adjacent
+        const Segment s = segment(i);
+        const Line<T>& line = line_of(i);
+        Curve &f = curves[static_cast<std::size_t>(before)], &g = curves[static_cast<std::size_t>(after)];
         double x = 0;
-        const double middle = (line_.abscissa(s.first) + line_.abscissa(s.last)) / 2;
-        if (!intersection(pieces_.curve(before), pieces_.curve(after), middle, x)) return false;
-        if (x < line_.abscissa(s.first - 1) || x > line_.abscissa(s.last + 1)) return false;
+        if (!intersection(f, g, (line.abscissa(s.first) + line.abscissa(s.last)) / 2, x)) return false;
+        if (x < line.abscissa(s.first - 1) || x > line.abscissa(s.last + 1)) return false;
         int cut = s.first - 1;
-        while (cut < s.last && line_.abscissa(cut + 1) <= x) ++cut;
+        while (cut < s.last && line.abscissa(cut + 1) <= x) ++cut;
         auto left = pieces_.sums(before), right = pieces_.sums(after);
-        if (cut >= s.first) left = joined(left, P::sums_over(line_, {s.first, cut}));
-        if (cut < s.last) right = joined(P::sums_over(line_, {cut + 1, s.last}), right);
-        const double v = sigma_of(s), least = curved_significance * v;
+        if (cut >= s.first) left = joined(left, P::sums_over(line, {s.first, cut}));
+        if (cut < s.last) right = joined(P::sums_over(line, {cut + 1, s.last}), right);
+        const double v = sigma_of(i), least = curved_significance * v;
         const double cost = residual_squares(left, least) + residual_squares(right, least) -
                             (residual(before) + residual(i) + residual(after));
         if (!(cost < straddling * straddling * limit_ * v * v)) return false;
         segment(before).last = cut;
         segment(after).first = cut + 1;
-        take(before, left, v);
-        take(after, right, v);
+        set_sums(before, left, v);
+        set_sums(after, right, v);
         remove(i);
+        f = pieces_.curve(before), g = pieces_.curve(after);
         return true;
     }
 
-    double sigma_of(const Segment& s) const { return line_.sigma_at(middle(s)); }
-
-    const Line<T>& line_;
+    const std::vector<Line<T>>& lines_;
     double limit_;
     P& pieces_;
-    std::vector<Join>& cheap_;
+    std::vector<int>&cuts_, &chosen_;
 };
 
 }  // namespace
 
 Projections EvenPieces::sums(int i) const {
     const auto k = static_cast<std::size_t>(i);
-    return {n_[k], mean_[k], y1_[k], y2_[k], squares_[k]};
+    return {sums_[n][k], sums_[mean][k], sums_[y1][k], sums_[y2][k], sums_[squares][k]};
 }
 
 void EvenPieces::set_sums(int i, const Projections& p) {
     const auto k = static_cast<std::size_t>(i);
-    n_[k] = p.n, mean_[k] = p.mean, y1_[k] = p.y1, y2_[k] = p.y2, squares_[k] = p.squares;
+    sums_[n][k] = p.n, sums_[mean][k] = p.mean, sums_[y1][k] = p.y1, sums_[y2][k] = p.y2, sums_[squares][k] = p.squares;
 }
 
 template <class T>
@@ -215,22 +225,46 @@ Projections EvenPieces::sums_over(const Line<T>& line, const Segment& s) {
 }
 
 template <class T>
-void EvenPieces::fit(const Line<T>& line) {
-    for (auto* numbers : {&n_, &base_, &mean_, &y1_, &y2_, &squares_}) numbers->resize(cost.size());
+void EvenPieces::fit(const std::vector<Line<T>>& lines) {
+    for (auto& numbers : sums_) numbers.resize(cost.size());
+    base_.resize(cost.size());
     for (std::size_t k = 0; k < links.size(); ++k) {
         const Segment& s = links[k].segment;
-        n_[k] = s.size();
+        const Line<T>& line = lines[static_cast<std::size_t>(links[k].line)];
         base_[k] = line.ordinate(middle(s));
         const Sums sums = sums_of(line.y + s.first, s.size(), base_[k]);
-        mean_[k] = sums.h, y1_[k] = sums.ht, y2_[k] = sums.htt, squares_[k] = sums.hh;
+        sums_[n][k] = s.size();
+        sums_[mean][k] = sums.h, sums_[y1][k] = sums.ht, sums_[y2][k] = sums.htt, sums_[squares][k] = sums.hh;
     }
-    project(cost.size() - 1, n_.data(), base_.data(), least.data(), mean_.data(), y1_.data(), y2_.data(), squares_.data(),
-            residual.data());
+    project(in_lanes(links.size()), column(n), base_.data(), least.data(), column(mean), column(y1), column(y2),
+            column(squares), residual.data());
 }
 
-void EvenPieces::price() {
-    price_all(cost.size() - 1, n_.data(), mean_.data(), y1_.data(), y2_.data(), squares_.data(), residual.data(),
-              sigma.data(), cost.data());
+void EvenPieces::price_all() {
+    const Columns left{column(n), column(mean), column(y1), column(y2), column(squares), residual.data()};
+    const Columns right{left.n + 1, left.mean + 1, left.y1 + 1, left.y2 + 1, left.squares + 1, left.residual + 1};
+    cost_all(in_lanes(links.size()), left, right, sigma.data(), cost.data());
+}
+
+// Gathered first, to be computed side by side.
+void EvenPieces::price(const std::vector<int>& cuts) {
+    constexpr int sides = 6;
+    const std::size_t count = in_lanes(cuts.size());
+    gathered_.resize((2 * sides + 2) * count);
+    const auto part = [&](int i) { return gathered_.data() + static_cast<std::size_t>(i) * count; };
+    for (std::size_t k = 0; k < cuts.size(); ++k) {
+        const auto i = static_cast<std::size_t>(cuts[k]);
+        const int right = links[i].next;
+        const std::size_t pair[2] = {i, right == none ? i : static_cast<std::size_t>(right)};
+        for (int side = 0; side < 2; ++side) {
+            for (int c = 0; c < columns; ++c) part(side * sides + c)[k] = sums_[c][pair[side]];
+            part(side * sides + columns)[k] = residual[pair[side]];
+        }
+        part(2 * sides)[k] = sigma[i];
+    }
+    const auto side = [&](int i) { return Columns{part(i), part(i + 1), part(i + 2), part(i + 3), part(i + 4), part(i + 5)}; };
+    cost_all(count, side(0), side(sides), part(2 * sides), part(2 * sides + 1));
+    for (std::size_t k = 0; k < cuts.size(); ++k) cost[static_cast<std::size_t>(cuts[k])] = part(2 * sides + 1)[k];
 }
 
 Curve EvenPieces::curve(int i) const {
@@ -248,21 +282,28 @@ Moments UnevenPieces::sums_over(const Line<T>& line, const Segment& s) {
 }
 
 template <class T>
-void UnevenPieces::fit(const Line<T>& line) {
+void UnevenPieces::fit(const std::vector<Line<T>>& lines) {
     sums_.resize(links.size());
     for (std::size_t k = 0; k < links.size(); ++k) {
-        sums_[k] = sums_over(line, links[k].segment);
+        sums_[k] = sums_over(lines[static_cast<std::size_t>(links[k].line)], links[k].segment);
         residual[k] = residual_squares(sums_[k], least[k]);
     }
 }
 
-void UnevenPieces::price() {
-    for (std::size_t k = 0; k < links.size(); ++k) {
-        cost[k] = HUGE_VAL;
-        if (!(sigma[k] > 0)) continue;
-        const double one = residual_squares(joined(sums_[k], sums_[k + 1]), curved_significance * sigma[k]);
-        cost[k] = cost_of(one, residual[k], residual[k + 1], sigma[k]);
-    }
+void UnevenPieces::price_all() {
+    for (std::size_t k = 0; k < links.size(); ++k) price(k);
+}
+
+void UnevenPieces::price(const std::vector<int>& cuts) {
+    for (const int i : cuts) price(static_cast<std::size_t>(i));
+}
+
+void UnevenPieces::price(std::size_t i) {
+    cost[i] = HUGE_VAL;
+    if (!(sigma[i] > 0)) return;
+    const auto right = static_cast<std::size_t>(links[i].next);
+    const double one = residual_squares(joined(sums_[i], sums_[right]), curved_significance * sigma[i]);
+    cost[i] = cost_of(one, residual[i], residual[right], sigma[i]);
 }
 
 Curve UnevenPieces::curve(int i) const {
@@ -281,70 +322,86 @@ bool intersection(const Curve& f, const Curve& g, double near, double& x) {
 }
 
 template <class T>
+void Approximator<T>::approximate(const Strip<T>& strip) {
+    split(strip);
+    if (parameters_.interpolate)
+        interpolate(strip);
+    else if (strip.lines.front().x)
+        fit(strip, uneven_);
+    else
+        fit(strip, even_);
+}
+
+template <class T>
 void Approximator<T>::split(const Strip<T>& strip) {
     splitter_.clear();
     for (const Line<T>& line : strip.lines)
         splitter_.add({line.y, line.x, line.scale, line.path.size, static_cast<T>(line.tolerance)});
     splitter_.split();
-}
-
-template <class T>
-const Approximation& Approximator<T>::approximate(const Strip<T>& strip, std::size_t i) {
-    const Line<T>& line = strip.lines[i];
-    result_.segments.clear();
-    result_.curves.clear();
-    splitter_.for_each_segment(i, [&](const Segment& s) { result_.segments.push_back(s); });
-    if (parameters_.interpolate)
-        interpolate(line);
-    else if (line.x)
-        fit(line, uneven_);
-    else
-        fit(line, even_);
-    return result_;
-}
-
-template <class T>
-void Approximator<T>::interpolate(const Line<T>& line) {
-    for (const Segment& s : result_.segments) {
-        const int middle = s.first + (s.last - s.first) / 2;
-        Moments moments;
-        moments.origin = line.abscissa(middle);
-        moments.base = line.ordinate(middle);
-        int added = s.first - 1;
-        for (const int k : {s.first, middle, s.last}) {
-            if (k > added) moments.add(line.abscissa(k), line.ordinate(k));
-            added = k;
-        }
-        result_.curves.push_back(fit_interpolating(moments));
+    segments_.clear();
+    curves_.clear();
+    starts_.assign(1, 0);
+    for (std::size_t i = 0; i < strip.lines.size(); ++i) {
+        splitter_.for_each_segment(i, [&](const Segment& s) { segments_.push_back(s); });
+        starts_.push_back(segments_.size());
     }
+}
+
+template <class T>
+void Approximator<T>::interpolate(const Strip<T>& strip) {
+    for (std::size_t i = 0; i < strip.lines.size(); ++i)
+        for (std::size_t j = starts_[i]; j < starts_[i + 1]; ++j) {
+            const Line<T>& line = strip.lines[i];
+            const Segment s = segments_[j];
+            const int m = s.first + (s.last - s.first) / 2;
+            Moments moments;
+            moments.origin = line.abscissa(m);
+            moments.base = line.ordinate(m);
+            int added = s.first - 1;
+            for (const int k : {s.first, m, s.last}) {
+                if (k > added) moments.add(line.abscissa(k), line.ordinate(k));
+                added = k;
+            }
+            curves_.push_back(fit_interpolating(moments));
+        }
 }
 
 template <class T>
 template <class P>
-void Approximator<T>::fit(const Line<T>& line, P& pieces) {
-    const int count = static_cast<int>(result_.segments.size());
-    if (count == 0) return;
-    pieces.resize(result_.segments.size(), result_.segments.size() / lanes * lanes + lanes + 1);
-    for (int i = 0; i < count; ++i) {
-        const Segment& s = result_.segments[static_cast<std::size_t>(i)];
-        const bool last = i + 1 == count;
-        const bool adjacent = !last && s.last + 1 == result_.segments[static_cast<std::size_t>(i) + 1].first &&
-                              line.abscissa(s.last) < line.abscissa(s.last + 1);
-        pieces.links[static_cast<std::size_t>(i)] = {s, i - 1, last ? none : i + 1};
-        pieces.sigma[static_cast<std::size_t>(i)] = adjacent ? line.sigma_at(s.last) : 0;
-        pieces.least[static_cast<std::size_t>(i)] = curved_significance * line.sigma_at(middle(s));
-    }
-    pieces.fit(line);
-    if (parameters_.merge_significance > 0) {
-        Joiner<T, P> joiner(line, parameters_, pieces, cheap_);
-        joiner.merge();
-        joiner.dissolve();
-    }
-    result_.segments.clear();
+void Approximator<T>::fit(const Strip<T>& strip, P& pieces) {
+    if (segments_.empty()) return;
+    pieces.links.resize(segments_.size());
+    for (auto* numbers : {&pieces.sigma, &pieces.least, &pieces.residual, &pieces.cost})
+        numbers->resize(in_lanes(segments_.size()) + 1);
+    for (std::size_t i = 0; i < strip.lines.size(); ++i)
+        for (std::size_t k = starts_[i]; k < starts_[i + 1]; ++k) {
+            const Line<T>& line = strip.lines[i];
+            const Segment s = segments_[k];
+            const bool adjacent = k + 1 < starts_[i + 1] && s.last + 1 == segments_[k + 1].first &&
+                                  line.abscissa(s.last) < line.abscissa(s.last + 1);
+            pieces.links[k] = {s, static_cast<int>(i), static_cast<int>(k) - 1, static_cast<int>(k) + 1, false};
+            pieces.sigma[k] = adjacent ? line.sigma_at(s.last) : 0;
+            pieces.least[k] = curved_significance * line.sigma_at(middle(s));
+        }
+    pieces.links.back().next = none;
+    pieces.fit(strip.lines);
+    const double limit = parameters_.merge_significance * parameters_.merge_significance;
+    Joiner<T, P> joiner(strip.lines, limit, pieces, cuts_, chosen_);
+    if (limit > 0) joiner.merge();
+    curves_.resize(segments_.size());
+    for (int i = 0; i != none; i = pieces.links[static_cast<std::size_t>(i)].next)
+        curves_[static_cast<std::size_t>(i)] = pieces.curve(i);
+    if (limit > 0) joiner.dissolve(curves_);
+    // Those that are left move together.
+    segments_.clear();
+    starts_.assign(1, 0);
     for (int i = 0; i != none; i = pieces.links[static_cast<std::size_t>(i)].next) {
-        result_.segments.push_back(pieces.links[static_cast<std::size_t>(i)].segment);
-        result_.curves.push_back(pieces.curve(i));
+        const Pieces::Link& link = pieces.links[static_cast<std::size_t>(i)];
+        starts_.resize(static_cast<std::size_t>(link.line) + 1, segments_.size());
+        curves_[segments_.size()] = curves_[static_cast<std::size_t>(i)];
+        segments_.push_back(link.segment);
     }
+    starts_.resize(strip.lines.size() + 1, segments_.size());
 }
 
 template class Approximator<float>;

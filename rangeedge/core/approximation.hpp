@@ -10,92 +10,93 @@
 
 namespace rangeedge {
 
+// The segments of one line and their curves.
 struct Approximation {
-    std::vector<Segment> segments;
-    std::vector<Curve> curves;
+    const Segment* segments;
+    const Curve* curves;
+    std::size_t count;
 };
 
-// Segments while they are joined: a linked list, of which the first one stays. Numbers of all are kept apart, to be
-// computed side by side; there is room for a few more.
+// Segments while they are joined: the list of those of all lines of a strip, in order. Numbers of all are kept apart,
+// to be computed side by side; there is room for a few more.
 struct Pieces {
     struct Link {
         Segment segment;
-        int previous, next;
+        int line, previous, next;
+        bool chosen;
     };
     std::vector<Link> links;
     std::vector<double> sigma;     // of the noise where the segment ends, 0 where the next one is not adjacent
     std::vector<double> least;     // significance of a quadratic term, in the unit of the ordinates
     std::vector<double> residual;  // sum of squares
     std::vector<double> cost;      // of taking back the cut on the right
-
-    void resize(std::size_t count, std::size_t room) {
-        links.resize(count);
-        for (auto* numbers : {&sigma, &least, &residual, &cost}) numbers->resize(room);
-    }
 };
 
-// Sums over the segments: of samples one unit apart, and of others.
+// With the sums over segments of samples one unit apart.
 class EvenPieces : public Pieces {
 public:
-    Projections sums(int i) const;
-    void set_sums(int i, const Projections& p);
     template <class T>
     static Projections sums_over(const Line<T>& line, const Segment& s);
     template <class T>
-    void fit(const Line<T>& line);
-    void price();
+    void fit(const std::vector<Line<T>>& lines);
+    void price_all();
+    void price(const std::vector<int>& cuts);
+    Projections sums(int i) const;
+    void set_sums(int i, const Projections& p);
     Curve curve(int i) const;
 
 private:
-    std::vector<double> n_, base_, mean_, y1_, y2_, squares_;
+    enum Column { n, mean, y1, y2, squares, columns };
+    double* column(Column c) { return sums_[c].data(); }
+    std::vector<double> sums_[columns], base_, gathered_;
 };
 
+// With the sums over segments of other samples.
 class UnevenPieces : public Pieces {
 public:
-    const Moments& sums(int i) const { return sums_[static_cast<std::size_t>(i)]; }
-    void set_sums(int i, const Moments& moments) { sums_[static_cast<std::size_t>(i)] = moments; }
     template <class T>
     static Moments sums_over(const Line<T>& line, const Segment& s);
     template <class T>
-    void fit(const Line<T>& line);
-    void price();
+    void fit(const std::vector<Line<T>>& lines);
+    void price_all();
+    void price(const std::vector<int>& cuts);
+    const Moments& sums(int i) const { return sums_[static_cast<std::size_t>(i)]; }
+    void set_sums(int i, const Moments& moments) { sums_[static_cast<std::size_t>(i)] = moments; }
     Curve curve(int i) const;
 
 private:
+    void price(std::size_t i);
     std::vector<Moments> sums_;
 };
 
-// A segment that may be joined with the next one, and what that costs.
-struct Join {
-    double cost;
-    int left;
-    // The cheapest, and of equals the leftmost, is on top of a heap.
-    bool operator<(const Join& other) const { return cost != other.cost ? cost > other.cost : left > other.left; }
-};
-
-// Approximates the lines of one strip after the other; what it needs for that is reused.
+// Approximates strip after strip; what it needs for that is reused.
 template <class T>
 class Approximator {
 public:
     explicit Approximator(const Parameters& parameters) : parameters_(parameters) {}
 
-    // Splits the lines (section 4.1).
-    void split(const Strip<T>& strip);
-    // Fits a curve to every segment of the i-th line (4.2, end), takes back cuts that the noise explains, and gives
-    // segments that lie across an edge to the surfaces beside it. Holds until the next call.
-    const Approximation& approximate(const Strip<T>& strip, std::size_t i);
+    // Splits the lines (section 4.1), fits a curve to every segment (4.2, end), takes back cuts that the noise
+    // explains, and gives segments that lie across an edge to the surfaces beside it.
+    void approximate(const Strip<T>& strip);
+    // Of the i-th line; holds until the next call of `approximate`.
+    Approximation line(std::size_t i) const {
+        return {segments_.data() + starts_[i], curves_.data() + starts_[i], starts_[i + 1] - starts_[i]};
+    }
 
 private:
-    void interpolate(const Line<T>& line);
+    void split(const Strip<T>& strip);
+    void interpolate(const Strip<T>& strip);
     template <class P>
-    void fit(const Line<T>& line, P& pieces);
+    void fit(const Strip<T>& strip, P& pieces);
 
     Parameters parameters_;
     Splitter<T> splitter_;
-    Approximation result_;
+    std::vector<Segment> segments_;
+    std::vector<Curve> curves_;
+    std::vector<std::size_t> starts_;  // of lines in both
     EvenPieces even_;
     UnevenPieces uneven_;
-    std::vector<Join> cheap_;
+    std::vector<int> cuts_, chosen_;
 };
 
 // Where f and g meet, the place nearest `near`; false where they do not.

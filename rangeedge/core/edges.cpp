@@ -36,14 +36,13 @@ public:
     void read(int first, int count, Strip<T>& strip) const { reader_.read(direction_, first, count, strip); }
 
     void detect(const Strip<T>& strip, Approximator<T>& approximator, std::vector<Candidate>& candidates) const {
-        approximator.split(strip);  // P 4.1
-        for (std::size_t i = 0; i < strip.lines.size(); ++i)
-            detect(strip.lines[i], approximator.approximate(strip, i), candidates);
+        approximator.approximate(strip);  // P 4.1
+        for (std::size_t i = 0; i < strip.lines.size(); ++i) detect(strip.lines[i], approximator.line(i), candidates);
     }
 
 private:
     void detect(const Line<T>& line, const Approximation& a, std::vector<Candidate>& candidates) const {
-        for (std::size_t i = 0; i + 1 < a.segments.size(); ++i) {
+        for (std::size_t i = 0; i + 1 < a.count; ++i) {
             if (a.segments[i + 1].first - a.segments[i].last - 1 > parameters_.max_gap) continue;
             const Cut cut = adapted_position(line, a, i);                                    // P 4.2, Fig. 5
             const Candidate candidate = measure(line, a.curves[i], a.curves[i + 1], cut);    // P 4.2, Fig. 4

@@ -80,14 +80,14 @@ struct Differences {
         std::size_t found = sizes.size();
         sizes.resize(end);
         ordinates.resize(end);
+        constexpr float most = std::numeric_limits<float>::max();
         for (std::ptrdiff_t i = 0; i < count; ++i) {
             const T* first = y + i * step;
             const double y0 = static_cast<double>(first[0]), y1 = static_cast<double>(first[apart]);
             const double y2 = static_cast<double>(first[2 * apart]), y3 = static_cast<double>(first[3 * apart]);
-            const auto size = static_cast<float>(std::abs(y3 - y0 - 3 * (y2 - y1)));
-            sizes[found] = size;
+            sizes[found] = static_cast<float>(std::abs(y3 - y0 - 3 * (y2 - y1)));
             ordinates[found] = static_cast<float>((y0 + y1 + y2 + y3) / 4);
-            found += size <= std::numeric_limits<float>::max();  // not so with NaN
+            found += sizes[found] <= most && std::abs(ordinates[found]) <= most;  // not so with NaN
         }
         sizes.resize(found);
         ordinates.resize(found);
