@@ -12,7 +12,6 @@ namespace {
 
 constexpr double curved_significance = 5;  // of the quadratic term of a least-squares fit
 constexpr double straddling = 2;           // how much more, in significance, a segment across an edge may cost
-constexpr int none = -1;
 
 // As many numbers, or a few more, as are computed side by side.
 std::size_t in_lanes(std::size_t count) { return (count + 7) / 8 * 8; }
@@ -97,21 +96,16 @@ template <class T, class P>
 class Joiner {
 public:
     Joiner(const std::vector<Line<T>>& lines, double limit, P& pieces, std::vector<int>& cuts, std::vector<int>& chosen)
-        : lines_(lines), limit_(limit), pieces_(pieces), cuts_(cuts), chosen_(chosen) {}
+        : lines_(lines), limit_(limit), pieces_(pieces), end_(pieces.end()), cuts_(cuts), chosen_(chosen) {}
 
     // Takes back cuts until each one left lowers the sum of squares enough: in every round those that cost less than
     // the cuts beside them.
     void merge() {
         pieces_.price_all();
-        cuts_.clear();
-        for (int i = 0; i != none; i = next(i)) cuts_.push_back(i);
+        cuts_.resize(static_cast<std::size_t>(end_));
+        for (int i = 0; i < end_; ++i) cuts_[static_cast<std::size_t>(i)] = i;
         while (!cuts_.empty()) {
-            chosen_.clear();
-            for (const int i : cuts_) {
-                if (chosen(i) || !is_cheapest(i)) continue;
-                chosen(i) = true;
-                chosen_.push_back(i);
-            }
+            choose();
             for (const int i : chosen_) {
                 const int right = next(i);
                 segment(i).last = segment(right).last;
@@ -122,23 +116,24 @@ public:
             cuts_.clear();
             for (const int i : chosen_) {
                 cuts_.push_back(i);
-                if (previous(i) != none && !chosen(previous(i))) cuts_.push_back(previous(i));
+                if (!chosen(previous(i))) cuts_.push_back(previous(i));
             }
             pieces_.price(cuts_);
             for (const int i : chosen_) chosen(i) = false;
             // These and the cuts beside them may be cheapest now.
-            for (std::size_t k = cuts_.size(); k-- > 0;)
-                for (const int beside : {previous(cuts_[k]), next(cuts_[k])})
-                    if (beside != none) cuts_.push_back(beside);
+            for (std::size_t k = cuts_.size(); k-- > 0;) {
+                cuts_.push_back(previous(cuts_[k]));
+                cuts_.push_back(next(cuts_[k]));
+            }
         }
     }
 
     // Splitting may leave a segment across an edge, its rounding included, where one cut would do. It is taken out
     // where the curves beside it meet within it and, given its samples, explain them nearly as well.
     void dissolve(std::vector<Curve>& curves) {
-        for (int i = next(0); i != none && next(i) != none;) {
+        for (int i = next(0); i != end_ && next(i) != end_;) {
             const int before = previous(i), after = next(i);
-            i = !dissolved(i, curves) || previous(before) == none ? after : before;
+            i = !dissolved(i, curves) || previous(before) == end_ ? after : before;
         }
     }
 
@@ -154,10 +149,18 @@ private:
     const Line<T>& line_of(int i) { return lines_[static_cast<std::size_t>(link(i).line)]; }
     double sigma_of(int i) { return line_of(i).sigma_at(middle(segment(i))); }
 
-    // Of equals the leftmost.
-    bool is_cheapest(int i) {
-        return cost(i) < limit_ && (previous(i) == none || cost(i) < cost(previous(i))) &&
-               (next(i) == none || cost(i) <= cost(next(i)));
+    // Of all cuts those that cost less than the ones beside them, of equals the leftmost. Without branches: which these
+    // are cannot be foretold.
+    void choose() {
+        chosen_.resize(cuts_.size());
+        std::size_t count = 0;
+        for (const int i : cuts_) {
+            const bool cheapest = (cost(i) < limit_) & (cost(i) < cost(previous(i))) & (cost(i) <= cost(next(i)));
+            chosen_[count] = i;
+            count += static_cast<std::size_t>(cheapest & !chosen(i));
+            chosen(i) |= cheapest;
+        }
+        chosen_.resize(count);
     }
 
     template <class Sums>
@@ -170,7 +173,7 @@ private:
 
     void remove(int i) {
         next(previous(i)) = next(i);
-        if (next(i) != none) previous(next(i)) = previous(i);
+        previous(next(i)) = previous(i);
     }
 
     bool dissolved(int i, std::vector<Curve>& curves) {
@@ -203,10 +206,21 @@ private:
     const std::vector<Line<T>>& lines_;
     double limit_;
     P& pieces_;
+    int end_;
     std::vector<int>&cuts_, &chosen_;
 };
 
 }  // namespace
+
+void Pieces::resize(std::size_t count) {
+    links.resize(count + 1);
+    links[count] = {{}, 0, static_cast<int>(count) - 1, 0, false};
+    for (auto* numbers : {&sigma, &least, &residual, &cost}) {
+        numbers->resize(in_lanes(count + 1) + 1);
+        std::fill(numbers->begin() + static_cast<std::ptrdiff_t>(count), numbers->end(), 0.0);
+    }
+    cost[count] = HUGE_VAL;
+}
 
 Projections EvenPieces::sums(int i) const {
     const auto k = static_cast<std::size_t>(i);
@@ -228,7 +242,7 @@ template <class T>
 void EvenPieces::fit(const std::vector<Line<T>>& lines) {
     for (auto& numbers : sums_) numbers.resize(cost.size());
     base_.resize(cost.size());
-    for (std::size_t k = 0; k < links.size(); ++k) {
+    for (std::size_t k = 0; k + 1 < links.size(); ++k) {
         const Segment& s = links[k].segment;
         const Line<T>& line = lines[static_cast<std::size_t>(links[k].line)];
         base_[k] = line.ordinate(middle(s));
@@ -254,8 +268,7 @@ void EvenPieces::price(const std::vector<int>& cuts) {
     const auto part = [&](int i) { return gathered_.data() + static_cast<std::size_t>(i) * count; };
     for (std::size_t k = 0; k < cuts.size(); ++k) {
         const auto i = static_cast<std::size_t>(cuts[k]);
-        const int right = links[i].next;
-        const std::size_t pair[2] = {i, right == none ? i : static_cast<std::size_t>(right)};
+        const std::size_t pair[2] = {i, static_cast<std::size_t>(links[i].next)};
         for (int side = 0; side < 2; ++side) {
             for (int c = 0; c < columns; ++c) part(side * sides + c)[k] = sums_[c][pair[side]];
             part(side * sides + columns)[k] = residual[pair[side]];
@@ -284,7 +297,7 @@ Moments UnevenPieces::sums_over(const Line<T>& line, const Segment& s) {
 template <class T>
 void UnevenPieces::fit(const std::vector<Line<T>>& lines) {
     sums_.resize(links.size());
-    for (std::size_t k = 0; k < links.size(); ++k) {
+    for (std::size_t k = 0; k + 1 < links.size(); ++k) {
         sums_[k] = sums_over(lines[static_cast<std::size_t>(links[k].line)], links[k].segment);
         residual[k] = residual_squares(sums_[k], least[k]);
     }
@@ -370,32 +383,30 @@ template <class T>
 template <class P>
 void Approximator<T>::fit(const Strip<T>& strip, P& pieces) {
     if (segments_.empty()) return;
-    pieces.links.resize(segments_.size());
-    for (auto* numbers : {&pieces.sigma, &pieces.least, &pieces.residual, &pieces.cost})
-        numbers->resize(in_lanes(segments_.size()) + 1);
+    pieces.resize(segments_.size());
     for (std::size_t i = 0; i < strip.lines.size(); ++i)
         for (std::size_t k = starts_[i]; k < starts_[i + 1]; ++k) {
             const Line<T>& line = strip.lines[i];
             const Segment s = segments_[k];
             const bool adjacent = k + 1 < starts_[i + 1] && s.last + 1 == segments_[k + 1].first &&
                                   line.abscissa(s.last) < line.abscissa(s.last + 1);
-            pieces.links[k] = {s, static_cast<int>(i), static_cast<int>(k) - 1, static_cast<int>(k) + 1, false};
+            const int own = static_cast<int>(k);
+            pieces.links[k] = {s, static_cast<int>(i), k > 0 ? own - 1 : pieces.end(), own + 1, false};
             pieces.sigma[k] = adjacent ? line.sigma_at(s.last) : 0;
             pieces.least[k] = curved_significance * line.sigma_at(middle(s));
         }
-    pieces.links.back().next = none;
     pieces.fit(strip.lines);
     const double limit = parameters_.merge_significance * parameters_.merge_significance;
     Joiner<T, P> joiner(strip.lines, limit, pieces, cuts_, chosen_);
     if (limit > 0) joiner.merge();
     curves_.resize(segments_.size());
-    for (int i = 0; i != none; i = pieces.links[static_cast<std::size_t>(i)].next)
+    for (int i = 0; i != pieces.end(); i = pieces.links[static_cast<std::size_t>(i)].next)
         curves_[static_cast<std::size_t>(i)] = pieces.curve(i);
     if (limit > 0) joiner.dissolve(curves_);
     // Those that are left move together.
     segments_.clear();
     starts_.assign(1, 0);
-    for (int i = 0; i != none; i = pieces.links[static_cast<std::size_t>(i)].next) {
+    for (int i = 0; i != pieces.end(); i = pieces.links[static_cast<std::size_t>(i)].next) {
         const Pieces::Link& link = pieces.links[static_cast<std::size_t>(i)];
         starts_.resize(static_cast<std::size_t>(link.line) + 1, segments_.size());
         curves_[segments_.size()] = curves_[static_cast<std::size_t>(i)];

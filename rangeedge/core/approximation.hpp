@@ -17,8 +17,8 @@ struct Approximation {
     std::size_t count;
 };
 
-// Segments while they are joined: the list of those of all lines of a strip, in order. Numbers of all are kept apart,
-// to be computed side by side; there is room for a few more.
+// Segments while they are joined: the list of those of all lines of a strip, in order, and of a last one that stands for
+// its end. Numbers of all are kept apart, to be computed side by side; there is room for a few more.
 struct Pieces {
     struct Link {
         Segment segment;
@@ -30,6 +30,9 @@ struct Pieces {
     std::vector<double> least;     // significance of a quadratic term, in the unit of the ordinates
     std::vector<double> residual;  // sum of squares
     std::vector<double> cost;      // of taking back the cut on the right
+
+    void resize(std::size_t count);
+    int end() const { return static_cast<int>(links.size()) - 1; }
 };
 
 // With the sums over segments of samples one unit apart.

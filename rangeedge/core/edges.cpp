@@ -92,7 +92,8 @@ private:
         const double cross = tf.s * tg.r - tf.r * tg.s, dot = tf.s * tg.s + tf.r * tg.r;
 
         double jump = cut.meeting ? 0 : std::abs(line.depth(yf) - line.depth(yg));
-        double crease = std::abs(std::atan2(cross, dot)) * degrees;
+        const double longer = std::max(std::abs(cross), std::abs(dot));  // lest they leave the range of single precision
+        double crease = std::abs(std::atan2(static_cast<float>(cross / longer), static_cast<float>(dot / longer))) * degrees;
         const double sigma = (line.sigma_at(cut.before) + line.sigma_at(cut.after)) / 2;
         const double turn_f = line.turn(tf, zf), turn_g = line.turn(tg, zg);
         const double vf = f.slope_variance(xf), vg = g.slope_variance(xg);
@@ -142,32 +143,44 @@ private:
 
 template <class T>
 std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters) {
-    // Neighbouring lines of one direction. Any thread may take any strip: they are many, and what they cost differs.
+    // Neighbouring lines of one direction. Any thread may take any part: they are many, and what they cost differs.
     struct Part {
         int direction, first, count;
-        std::vector<Candidate> found;
+        int thread;  // whose candidates from begin to end are of this part
+        std::size_t begin, end;
     };
     std::vector<Part> parts;
     for (const int direction : {rows_bit, cols_bit, diag45_bit, diag135_bit}) {
         const int lines = parameters.directions & direction ? line_count(direction, image.rows, image.cols) : 0;
         for (int first = 0; first < lines; first += strip_lines)
-            parts.push_back({direction, first, std::min(strip_lines, lines - first), {}});
+            parts.push_back({direction, first, std::min(strip_lines, lines - first), 0, 0, 0});
     }
+    Team team(parameters.threads);
+    std::vector<std::vector<Candidate>> found(static_cast<std::size_t>(team.size()));
     std::atomic<std::size_t> taken{0};
-    const int threads = std::max(1, parameters.threads);
-    parallel_for(threads, threads, [&](int, int, int) {
+    team.run([&](int thread) {
         Strip<T> strip;
         Approximator<T> approximator(parameters);
+        auto& own = found[static_cast<std::size_t>(thread)];
         for (std::size_t i; (i = taken++) < parts.size();) {
             Part& part = parts[i];
             const LineDetector<T> detector(image, noise, parameters, part.direction);
             detector.read(part.first, part.count, strip);
-            detector.detect(strip, approximator, part.found);
+            part.thread = thread;
+            part.begin = own.size();
+            detector.detect(strip, approximator, own);
+            part.end = own.size();
         }
     });
+    std::size_t size = 0;
+    for (const auto& own : found) size += own.size();
     std::vector<Candidate> candidates;
-    for (const Part& part : parts) candidates.insert(candidates.end(), part.found.begin(), part.found.end());
-    pool(candidates, image, parameters);
+    candidates.reserve(size);
+    for (const Part& part : parts) {
+        const Candidate* own = found[static_cast<std::size_t>(part.thread)].data();
+        candidates.insert(candidates.end(), own + part.begin, own + part.end);
+    }
+    pool(candidates, image, parameters, team);
     return candidates;
 }
 

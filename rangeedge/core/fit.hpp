@@ -59,12 +59,12 @@ inline Moments joined(const Moments& a, const Moments& b) {
 }
 
 // f(x) = c0 + c1 p1 + c2 p2 in the polynomials p1 = x - mean and p2 = p1^2 - alpha p1 - beta, which are orthogonal
-// over the samples. A line has c2 = 0 and norm2 = 0; a single sample has c1 = 0 and norm1 = 0 as well.
+// over the samples, with the variances of c0, c1 and c2 for samples of unit variance. A line has c2 = 0 and v2 = 0; a
+// single sample has c1 = 0 and v1 = 0 as well.
 struct Curve {
     double base = 0, mean = 0, alpha = 0, beta = 0;
     double c0 = 0, c1 = 0, c2 = 0;
-    double n = 0, norm1 = 0, norm2 = 0;  // squared norms of 1, p1, p2 where they are used
-    double sum_squares = 0;              // of the residuals
+    double v0 = 0, v1 = 0, v2 = 0;
 
     double value(double x) const {
         const double p1 = x - mean;
@@ -74,11 +74,11 @@ struct Curve {
     // Variances for samples of unit variance; a slope that the samples do not fix has none: infinite.
     double value_variance(double x) const {
         const double p1 = x - mean, p2 = (p1 - alpha) * p1 - beta;
-        return 1 / n + (norm1 > 0 ? p1 * p1 / norm1 : 0) + (norm2 > 0 ? p2 * p2 / norm2 : 0);
+        return v0 + p1 * p1 * v1 + p2 * p2 * v2;
     }
     double slope_variance(double x) const {
         const double d = 2 * (x - mean) - alpha;
-        return norm1 > 0 ? 1 / norm1 + (norm2 > 0 ? d * d / norm2 : 0) : HUGE_VAL;
+        return v1 > 0 ? v1 + d * d * v2 : HUGE_VAL;
     }
 };
 
@@ -113,7 +113,7 @@ Curve fit_least_squares(const Moments& moments, double least);
 Curve fit_least_squares(const Projections& projections, double first, double least);  // `first`: the first abscissa
 
 // The sum of squared residuals of that curve.
-inline double residual_squares(const Moments& moments, double least) { return fit_least_squares(moments, least).sum_squares; }
+double residual_squares(const Moments& moments, double least);
 inline double residual_squares(const Projections& p, double least) {
     const double line = p.n > 1 ? p.squares - p.y1 * p.y1 / Projections::norm1(p.n) : 0;
     const double gain = p.n > 3 ? p.gain() : 0;

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstddef>
 
-#include "parallel.hpp"
 #include "simd.hpp"
 
 namespace rangeedge {
@@ -68,9 +67,9 @@ public:
 
     // Calls visit(index, neighbours) for all candidates, several rows of cells at a time.
     template <class Visit>
-    void for_each_near(int threads, Visit&& visit) const {
+    void for_each_near(Team& team, Visit&& visit) const {
         std::atomic<int> taken{0};
-        parallel_for(threads, threads, [&](int, int, int) {
+        team.run([&](int) {
             for (int v; (v = taken++) < rows_;)
                 for (int u = 0; u < cols_; ++u) visit_cell(u, v, visit);
         });
@@ -174,7 +173,7 @@ CommonLine common_line(const Grid::Near& near) {
     const double n = sums.n, mx = sums.x / n, my = sums.y / n;
     const double sxx = sums.xx / n - mx * mx, sxy = sums.xy / n - mx * my, syy = sums.yy / n - my * my;
     // The line runs at half the angle of (sxx - syy, 2 sxy).
-    const double spread = std::hypot(sxx - syy, 2 * sxy);
+    const double spread = std::sqrt((sxx - syy) * (sxx - syy) + 4 * sxy * sxy);
     const double cosine = spread > 0 ? (sxx - syy) / spread : 1, sine = spread > 0 ? 2 * sxy / spread : 0;
     const double larger = std::sqrt((1 + std::abs(cosine)) / 2), smaller = std::abs(sine) / (2 * larger);
     CommonLine line{};
@@ -305,7 +304,7 @@ Grid tangents_of(const std::vector<Candidate>& candidates, int rows, int cols) {
 }  // namespace
 
 template <class T>
-void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const Parameters& parameters) {
+void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const Parameters& parameters, Team& team) {
     const auto least = static_cast<float>(parameters.min_significance);
     const bool aligned = parameters.max_shift > 0;
     if (!(least > 0 || aligned || parameters.normals)) return;
@@ -314,7 +313,7 @@ void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const 
         const float s = std::min(candidates[i].significance, capped);
         grid.field(evidence_field)[k] = s * s;
     });
-    grid.for_each_near(parameters.threads, [&](std::size_t i, const Grid::Near& near) {
+    grid.for_each_near(team, [&](std::size_t i, const Grid::Near& near) {
         Candidate& c = candidates[i];
         c.significance = std::max(std::sqrt(evidence(near)), c.significance * lone);
     });
@@ -323,21 +322,21 @@ void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const 
         grid.for_each([&](std::size_t i, std::size_t k) {
             if (weak(candidates[i])) grid.remove(k);
         });
-        grid.for_each_near(parameters.threads, [&](std::size_t i, const Grid::Near& near) {
+        grid.for_each_near(team, [&](std::size_t i, const Grid::Near& near) {
             if (!weak(candidates[i])) align(candidates[i], near, image, parameters.max_shift);
         });
     }
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), weak), candidates.end());
     if (!parameters.normals) return;
     const Grid tangents = tangents_of(candidates, image.rows, image.cols);
-    tangents.for_each_near(parameters.threads, [&](std::size_t i, const Grid::Near& near) {
+    tangents.for_each_near(team, [&](std::size_t i, const Grid::Near& near) {
         Candidate& c = candidates[i];
         const double angle = c.crease > 0 ? normal_angle(near, image.projective) : -1;
         if (angle >= 0) c.crease = static_cast<float>(angle);
     });
 }
 
-template void pool(std::vector<Candidate>&, const RangeImage<float>&, const Parameters&);
-template void pool(std::vector<Candidate>&, const RangeImage<double>&, const Parameters&);
+template void pool(std::vector<Candidate>&, const RangeImage<float>&, const Parameters&, Team&);
+template void pool(std::vector<Candidate>&, const RangeImage<double>&, const Parameters&, Team&);
 
 }  // namespace rangeedge

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "edges.hpp"
+#include "parallel.hpp"
 
 namespace rangeedge {
 
@@ -11,6 +12,6 @@ namespace rangeedge {
 // line, and drops those below `min_significance`. With `normals`, the crease becomes the angle between the normals of
 // the two surfaces, each found from the tangents that the neighbours have on its side.
 template <class T>
-void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const Parameters& parameters);
+void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const Parameters& parameters, Team& team);
 
 }  // namespace rangeedge

@@ -1,51 +1,126 @@
-// Splits a loop over threads.
+// Threads that work together on one loop after the other.
+// SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
 #include <cstddef>
 #include <exception>
+#include <functional>
+#include <mutex>
 #include <system_error>
 #include <thread>
+#include <utility>
 #include <vector>
 
 namespace rangeedge {
 
+// The caller's own thread and others, which wait from one call of `run` to the next. How many threads are worth their
+// work is the caller's to say; where the system grants fewer, these do all of it.
+class Team {
+public:
+    explicit Team(int threads) {
+        workers_.reserve(static_cast<std::size_t>(std::max(0, threads - 1)));
+        try {
+            for (int i = 1; i < threads; ++i) workers_.emplace_back([this, i] { work(i); });
+        } catch (const std::system_error&) {
+        }
+        thrown_.resize(workers_.size() + 1);
+    }
+    ~Team() {
+        if (workers_.empty()) return;
+        start(nullptr);
+        for (std::thread& worker : workers_) worker.join();
+    }
+    Team(const Team&) = delete;
+    Team& operator=(const Team&) = delete;
+
+    int size() const { return static_cast<int>(workers_.size()) + 1; }
+
+    // Calls body(thread) once on every thread, counted from 0, and returns when all are done. Should any throw, the
+    // rest still finish and the first exception reaches the caller.
+    template <class F>
+    void run(F&& body) {
+        if (workers_.empty()) {
+            body(0);
+            return;
+        }
+        const std::function<void(int)> job = std::ref(body);
+        busy_ = static_cast<int>(workers_.size());
+        start(&job);
+        call(job, 0);
+        await([this] { return busy_ == 0; });
+        for (std::exception_ptr& thrown : thrown_)
+            if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));
+    }
+
+private:
+    void start(const std::function<void(int)>* job) {
+        {
+            const std::lock_guard<std::mutex> lock(mutex_);
+            job_ = job;
+            ++round_;
+        }
+        changed_.notify_all();
+    }
+    void work(int thread) {
+        for (int round = 0;;) {
+            await([this, round] { return round_ != round; });
+            ++round;
+            if (!job_) return;
+            call(*job_, thread);
+            {
+                const std::lock_guard<std::mutex> lock(mutex_);
+                --busy_;
+            }
+            changed_.notify_all();
+        }
+    }
+    void call(const std::function<void(int)>& job, int thread) noexcept {
+        try {
+            job(thread);
+        } catch (...) {
+            thrown_[static_cast<std::size_t>(thread)] = std::current_exception();
+        }
+    }
+    // Loops follow each other closely: asking again and again for a while is quicker than being woken.
+    template <class F>
+    void await(F&& ready) {
+        const auto end = std::chrono::steady_clock::now() + std::chrono::milliseconds(1);
+        do {
+            for (int i = 0; i < 32; ++i)
+                if (ready()) return;
+            std::this_thread::yield();
+        } while (std::chrono::steady_clock::now() < end);
+        std::unique_lock<std::mutex> lock(mutex_);
+        changed_.wait(lock, ready);
+    }
+
+    std::vector<std::thread> workers_;
+    std::vector<std::exception_ptr> thrown_;
+    std::mutex mutex_;
+    std::condition_variable changed_;
+    const std::function<void(int)>* job_ = nullptr;
+    std::atomic<int> round_{0}, busy_{0};
+};
+
 // Runs body(begin, end, thread) on contiguous chunks that cover [0, count), at most one chunk per thread, and returns
-// when all are done. `thread` counts from 0, so that each may own a buffer. Chunks depend on `threads`, results must
-// not: let body(begin, end, .) do for each index what body(index, index + 1, .) would. With one thread, or one index,
-// the body runs on the caller's own thread; whether the work is worth more threads is the caller's to say. Should any
-// chunk throw, the rest still finish and the first chunk's exception reaches the caller.
+// when all are done. `thread` counts from 0, so that each may own a buffer. Chunks depend on the team, results must
+// not: let body(begin, end, .) do for each index what body(index, index + 1, .) would.
+template <class F>
+void parallel_for(int count, Team& team, F&& body) {
+    team.run([&](int thread) {
+        const auto start = [&](int t) { return static_cast<int>(static_cast<long long>(count) * t / team.size()); };
+        if (start(thread) < start(thread + 1)) body(start(thread), start(thread + 1), thread);
+    });
+}
+
 template <class F>
 void parallel_for(int count, int threads, F&& body) {
-    if (count <= 0) return;
-    const int chunks = std::max(1, std::min(count, threads));
-    if (chunks == 1) {
-        body(0, count, 0);
-        return;
-    }
-    const auto start = [=](int chunk) { return static_cast<int>(static_cast<long long>(count) * chunk / chunks); };
-    std::vector<std::exception_ptr> thrown(static_cast<std::size_t>(chunks));
-    const auto run = [&](int chunk) noexcept {
-        try {
-            body(start(chunk), start(chunk + 1), chunk);
-        } catch (...) {
-            thrown[static_cast<std::size_t>(chunk)] = std::current_exception();
-        }
-    };
-    std::vector<std::thread> workers;
-    workers.reserve(static_cast<std::size_t>(chunks - 1));
-    int own = 1;  // chunks this thread runs: the first, and those for which the system grants no thread
-    for (int chunk = chunks - 1; chunk >= own; --chunk) {
-        try {
-            workers.emplace_back(run, chunk);
-        } catch (const std::system_error&) {
-            own = chunk + 1;
-        }
-    }
-    for (int chunk = 0; chunk < own; ++chunk) run(chunk);
-    for (std::thread& worker : workers) worker.join();
-    for (const std::exception_ptr& error : thrown)
-        if (error) std::rethrow_exception(error);
+    Team team(std::min(count, threads));
+    parallel_for(count, team, body);
 }
 
 }  // namespace rangeedge

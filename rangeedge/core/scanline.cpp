@@ -12,6 +12,37 @@ namespace {
 
 constexpr int exact = 3;  // samples that a quadratic passes through
 
+// Negative lanes are not valid: the bits of a NaN, without its sign, exceed those of infinity.
+template <int bytes>
+RANGEEDGE_INLINE Ints<bytes> validity(const float* y) {
+    return Ints<bytes>::all(0x7f800000) - bits(magnitude(Floats<bytes>::load(y)));
+}
+
+// The first sample that is valid or is not: blocks without one are passed over, then lanes, then samples.
+template <int bytes, bool valid>
+RANGEEDGE_INLINE int find_in(const float* y, int k, int n) {
+    constexpr int lanes = Ints<bytes>::count;
+    const auto join = [](auto a, auto b) RANGEEDGE_ALWAYS { return valid ? a & b : a | b; };
+    for (; k + 4 * lanes <= n; k += 4 * lanes) {
+        const auto block = join(join(validity<bytes>(y + k), validity<bytes>(y + k + lanes)),
+                                join(validity<bytes>(y + k + 2 * lanes), validity<bytes>(y + k + 3 * lanes)));
+        if ((block.joined(join) >= 0) == valid) break;
+    }
+    while (k + lanes <= n && (validity<bytes>(y + k).joined(join) >= 0) != valid) k += lanes;
+    while (k < n && (y[k] == y[k]) != valid) ++k;
+    return k;
+}
+template <int bytes>
+RANGEEDGE_INLINE int first_valid_in(const float* y, int k, int n) {
+    return find_in<bytes, true>(y, k, n);
+}
+template <int bytes>
+RANGEEDGE_INLINE int first_invalid_in(const float* y, int k, int n) {
+    return find_in<bytes, false>(y, k, n);
+}
+RANGEEDGE_VERSIONS(int, first_valid, (const float* y, int k, int n), (y, k, n))
+RANGEEDGE_VERSIONS(int, first_invalid, (const float* y, int k, int n), (y, k, n))
+
 // The quadratic through both end points and the midpoint, y = ym + t (b + a t) with t counted from the midpoint.
 template <class T>
 struct ThreePoint {
@@ -95,6 +126,9 @@ RANGEEDGE_VERSIONS(void, find_worst,
 
 }  // namespace
 
+int find_valid(const float* y, int k, int n) { return first_valid(y, k, n); }
+int find_invalid(const float* y, int k, int n) { return first_invalid(y, k, n); }
+
 template <class T>
 void Splitter<T>::clear() {
     lines_.clear();
@@ -128,20 +162,29 @@ void Splitter<T>::split() {
                 const Node& node = nodes_[static_cast<std::size_t>(pending_[i])];
                 worst_[i] = worst_of(lines_[static_cast<std::size_t>(node.line)], node.segment);
             }
-        following_.clear();
+        // Without branches: which segments are cut cannot be foretold.
+        std::size_t count = nodes_.size(), follow = 0;
+        nodes_.resize(count + pending_.size());
+        following_.resize(2 * pending_.size());
         for (std::size_t i = 0; i < pending_.size(); ++i) {
-            const Node node = nodes_[static_cast<std::size_t>(pending_[i])];
+            Node& node = nodes_[static_cast<std::size_t>(pending_[i])];
             const Samples<T>& line = lines_[static_cast<std::size_t>(node.line)];
-            if (!(worst_[i].residual > line.eps)) continue;
+            const bool split = worst_[i].residual > line.eps;
             // The cut falls between two samples; the extreme one joins the neighbour it is closer to.
             const int k = worst_[i].at;
             const bool joins_left = std::abs(line.y[k] - line.y[k - 1]) <= std::abs(line.y[k + 1] - line.y[k]);
-            const int cut = joins_left ? k : k - 1, right = static_cast<int>(nodes_.size());
-            nodes_.push_back({{cut + 1, node.segment.last}, node.line, node.next});
-            nodes_[static_cast<std::size_t>(pending_[i])] = {{node.segment.first, cut}, node.line, right};
-            if (cut - node.segment.first >= exact) following_.push_back(pending_[i]);
-            if (node.segment.last - cut > exact) following_.push_back(right);
+            const int cut = joins_left ? k : k - 1, right = static_cast<int>(count);
+            nodes_[count] = {{cut + 1, node.segment.last}, node.line, node.next};
+            following_[follow] = pending_[i];
+            follow += static_cast<std::size_t>(split & (cut - node.segment.first >= exact));
+            following_[follow] = right;
+            follow += static_cast<std::size_t>(split & (node.segment.last - cut > exact));
+            node.segment.last = split ? cut : node.segment.last;
+            node.next = split ? right : node.next;
+            count += static_cast<std::size_t>(split);
         }
+        nodes_.resize(count);
+        following_.resize(follow);
     }
 }
 

@@ -1,7 +1,6 @@
 // Scan line approximation (paper, section 4.1): one scan line, a curve in a plane, is split into segments.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <cstring>
 #include <vector>
 
 namespace rangeedge {
@@ -13,32 +12,22 @@ struct Segment {
 };
 
 // The first sample at or after k, and before n, that is valid or is not; else n. NaN marks a sample without data.
-template <bool valid, class T>
-int find(const T* y, int k, int n) {
-    typedef T Lanes __attribute__((vector_size(16)));
-    constexpr int count = 4 * sizeof(Lanes) / sizeof(T);
-    const auto found_in_lanes = [y](int first) {
-        Lanes lanes[4];
-        std::memcpy(lanes, y + first, sizeof lanes);
-        auto invalid = lanes[0] != lanes[0];
-        for (int i = 1; i < 4; ++i) {
-            const auto also = lanes[i] != lanes[i];
-            invalid = valid ? invalid & also : invalid | also;
-        }
-        long long halves[2];
-        std::memcpy(halves, &invalid, sizeof halves);
-        return valid ? (halves[0] & halves[1]) != -1 : (halves[0] | halves[1]) != 0;
-    };
-    while (k + count <= n && !found_in_lanes(k)) k += count;
-    while (k < n && (y[k] == y[k]) != valid) ++k;
+int find_valid(const float* y, int k, int n);
+int find_invalid(const float* y, int k, int n);
+inline int find_valid(const double* y, int k, int n) {
+    while (k < n && !(y[k] == y[k])) ++k;
+    return k;
+}
+inline int find_invalid(const double* y, int k, int n) {
+    while (k < n && y[k] == y[k]) ++k;
     return k;
 }
 
 // Calls visit(first, last) for every maximal stretch of valid samples, cut where the abscissa does not increase.
 template <class T, class Visit>
 void for_each_run(const T* y, const T* x, int n, Visit&& visit) {
-    for (int k = find<true>(y, 0, n); k < n; k = find<true>(y, k, n)) {
-        const int end = find<false>(y, k, n);
+    for (int k = find_valid(y, 0, n); k < n; k = find_valid(y, k, n)) {
+        const int end = find_invalid(y, k, n);
         while (k < end) {
             const int first = k++;
             if (!x) k = end;
