@@ -18,7 +18,6 @@ from ._constants import (
     CREASE_MAX,
     CREASE_NORMAL,
     DIR_ALL,
-    EDGE_BOUNDARY,
     FIT_INTERP,
     FIT_LSQ,
     MEASURE_ENDPOINT,
@@ -352,16 +351,18 @@ def frame_of(func: str, src: np.ndarray, params: ScanLineParams, mask: np.ndarra
 
 def strength_of(func: str, frame: RangeFrame, params: ScanLineParams) -> EdgeStrength:
     """Edge strengths of a checked range image."""
-    strength = EdgeStrength(
-        np.empty(frame.shape, np.float32),
-        np.empty(frame.shape, np.float32),
-        np.empty(frame.shape, np.uint8),
-        np.empty(frame.shape, np.float32),
-    )
+    strength = _no_strength(frame.shape)
     noise = kernel_noise(func, params.noise, frame)
     _core.edge_strength(*frame.kernel_args, *noise, _kernel_parameters(params, frame), *strength)
-    np.bitwise_or(strength.kind, frame.boundary * np.uint8(EDGE_BOUNDARY), out=strength.kind)
     return strength
+
+
+def _no_strength(shape: tuple[int, int]) -> EdgeStrength:
+    """All zero. The maps share one allocation: the system takes a while to hand out new memory."""
+    size = shape[0] * shape[1]
+    maps = np.zeros(13 * size, np.uint8)
+    floats = maps[: 12 * size].view(np.float32).reshape(3, *shape)
+    return EdgeStrength(floats[0], floats[1], maps[12 * size :].reshape(shape), floats[2])
 
 
 _POINT = [("x", "f4"), ("y", "f4"), ("jump", "f4"), ("crease", "f4")]

@@ -9,6 +9,7 @@ from typing import Any
 import cv2
 import numpy as np
 
+from . import _core
 from ._args import array, boolean, camera_matrix, described, fail, image8, number, pixel_size
 
 _THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
@@ -58,12 +59,6 @@ class RangeFrame:
         """Distance along the viewing axis, NaN where invalid."""
         return 1 / self.ordinate if self.projective else -self.ordinate
 
-    @cached_property
-    def boundary(self) -> np.ndarray:
-        """uint8, 1 at valid pixels with an invalid one among their eight neighbours."""
-        inner = cv2.erode(self.valid, np.ones((3, 3), np.uint8), borderType=cv2.BORDER_CONSTANT, borderValue=1)
-        return self.valid & (1 - inner)
-
     @property
     def kernel_args(self) -> tuple[Any, ...]:
         """What every kernel on scan lines takes first."""
@@ -96,10 +91,9 @@ def range_frame(
         expected = "heights as floats (or unsigned integers, 0 for no data) where heightMap is True"
         raise fail(func, "src", expected, described(src), cv2.Error.StsUnsupportedFormat)
     if K is not None:
-        frame = _pinhole(_lengths(func, src, depthFactor), camera_matrix(func, "K", K))
-    else:
-        spacing = (1.0, 1.0) if pixelSize is None else pixel_size(func, "pixelSize", pixelSize)
-        frame = _grid(_lengths(func, src, depthFactor), spacing, heightMap)
+        return _pinhole(func, src, depthFactor, inside, camera_matrix(func, "K", K))
+    spacing = (1.0, 1.0) if pixelSize is None else pixel_size(func, "pixelSize", pixelSize)
+    frame = _grid(_lengths(func, src, depthFactor), spacing, heightMap)
     if inside is None:
         return frame
     samples = frame.samples.copy() if np.shares_memory(frame.samples, src) else frame.samples
@@ -119,11 +113,13 @@ def _lengths(func: str, src: np.ndarray, depthFactor: float) -> np.ndarray:
     return lengths
 
 
-def _pinhole(depth: np.ndarray, K: np.ndarray) -> RangeFrame:
-    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        inverse = 1 / depth
-        # The inverse of 0, of a negative, of a denormal or of a non-finite depth is none of a point's.
-        inverse[~((inverse > 0) & (inverse < np.inf))] = np.nan
+def _pinhole(
+    func: str, src: np.ndarray, depthFactor: float, inside: np.ndarray | None, K: np.ndarray
+) -> RangeFrame:
+    # The kernel divides by the factor what depth cameras give; other integers are divided here.
+    depth = np.ascontiguousarray(src) if src.dtype == np.uint16 else _lengths(func, src, depthFactor)
+    inverse = np.empty(depth.shape, np.float32 if depth.dtype == np.uint16 else depth.dtype)
+    _core.invert_depth(depth, depthFactor, None if inside is None else inside.view(np.uint8), inverse)
     return RangeFrame(inverse, True, tuple(np.linalg.inv(K)[:2].ravel().tolist()))
 
 

@@ -89,6 +89,17 @@ Noise noise_model(const NoiseArgs& abc, const std::optional<In<float>>& map) {
     return {abc[0], abc[1], abc[2], abc[3], map ? map->data() : nullptr};
 }
 
+template <class T, class Real>
+void define_inverse(nb::module_& m) {
+    m.def(
+        "invert_depth",
+        [](In<T> depth, Real factor, std::optional<In<std::uint8_t>> mask, Out<Real> inverse) {
+            nb::gil_scoped_release release;
+            invert_depth(depth.data(), depth.size(), factor, mask ? mask->data() : nullptr, inverse.data());
+        },
+        "depth"_a.noconvert(), "factor"_a, "mask"_a.noconvert().none(), "inverse"_a.noconvert());
+}
+
 template <class T>
 void define(nb::module_& m) {
     m.def("split_scan_line", &split_scan_line<T>, "y"_a.noconvert(), "x"_a.noconvert().none(), "eps"_a);
@@ -124,9 +135,10 @@ void define(nb::module_& m) {
            std::optional<In<float>> noise_map, const Parameters& parameters, Out<float> jump, Out<float> crease,
            Out<std::uint8_t> kind, Out<float> significance) {
             nb::gil_scoped_release release;
-            const auto candidates = detect(range_image(src, projective, to_plane, axis), noise_model(noise, noise_map), parameters);
-            combine(candidates, static_cast<std::int64_t>(jump.size()), jump.data(), crease.data(), kind.data(),
-                            significance.data());
+            const auto image = range_image(src, projective, to_plane, axis);
+            combine(detect(image, noise_model(noise, noise_map), parameters), jump.data(), crease.data(), kind.data(),
+                    significance.data());
+            mark_boundary(image, boundary_bit, kind.data());
         },
         "src"_a.noconvert(), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a, "noise_map"_a.noconvert().none(), "parameters"_a,
         "jump"_a.noconvert(), "crease"_a.noconvert(), "kind"_a.noconvert(), "significance"_a.noconvert());
@@ -148,4 +160,7 @@ void bind_edges(nb::module_& m) {
             "max_gap"_a, "merge_significance"_a, "min_significance"_a, "threads"_a);
     define<float>(m);
     define<double>(m);
+    define_inverse<float, float>(m);
+    define_inverse<double, double>(m);
+    define_inverse<std::uint16_t, float>(m);
 }

@@ -184,12 +184,8 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
     return candidates;
 }
 
-void combine(const std::vector<Candidate>& candidates, std::int64_t size, float* jump, float* crease,
-             std::uint8_t* kind, float* significance) {
-    std::fill(jump, jump + size, 0.0f);
-    std::fill(crease, crease + size, 0.0f);
-    std::fill(kind, kind + size, std::uint8_t{0});
-    std::fill(significance, significance + size, 0.0f);
+void combine(const std::vector<Candidate>& candidates, float* jump, float* crease, std::uint8_t* kind,
+             float* significance) {
     for (const Candidate& c : candidates) {
         for (const std::int32_t p : {c.before, c.after}) {
             const bool nearer = ((c.kind & occluding_bit) != 0) == (p == c.before);

@@ -5,25 +5,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "geometry.hpp"
+
 namespace rangeedge {
-
-// How pixels become samples of a plane curve (s, r). The ordinate y grows toward the viewer: inverse depth where
-// `projective`, else height or negative depth. NaN marks an invalid pixel.
-template <class T>
-struct RangeImage {
-    int rows, cols;
-    const T* ordinate;    // (rows, cols), or null where `points` is given
-    const T* points;      // (rows, cols, 3) in the camera frame, or null
-    bool projective;      // rays from one point; else parallel to `axis`
-    double to_plane[6];   // pixel (u, v, 1) to normalised image coordinates, or to lengths on the grid
-    double axis[3];       // viewing direction of `points`
-
-    bool valid_at(int col, int row) const {
-        if (col < 0 || row < 0 || col >= cols || row >= rows) return false;
-        const std::int64_t i = static_cast<std::int64_t>(row) * cols + col;
-        return std::isfinite(ordinate ? ordinate[i] : points[3 * i] + points[3 * i + 1] + points[3 * i + 2]);
-    }
-};
 
 // Standard deviation of a length z: a + b z + c z^2, or given for every pixel.
 struct Noise {
@@ -57,6 +41,7 @@ enum Kind : std::uint8_t {
     concave_bit = 4,
     occluding_bit = 8,  // of a candidate: the surface before the cut is the nearer one
     occluded_bit = 16,
+    boundary_bit = 32,  // of a pixel
 };
 
 constexpr float endless = 1e30f;  // at most so large are variances and significances
@@ -82,8 +67,8 @@ struct Candidate {
 template <class T>
 std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters);
 
-// Largest strengths per pixel; the kind of a crease comes with its largest angle. The outputs have `size` pixels.
-void combine(const std::vector<Candidate>& candidates, std::int64_t size, float* jump, float* crease,
-             std::uint8_t* kind, float* significance);
+// Largest strengths per pixel; the kind of a crease comes with its largest angle. The outputs hold zeros before.
+void combine(const std::vector<Candidate>& candidates, float* jump, float* crease, std::uint8_t* kind,
+             float* significance);
 
 }  // namespace rangeedge
