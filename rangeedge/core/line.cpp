@@ -111,6 +111,17 @@ void LineReader<T>::take_rows(Strip<T>& strip) const {
     }
 }
 
+// The first `rows` samples of all lines of a strip, of which each row, `step` after the other, has one side by side.
+template <int rows, class T>
+void turn_tile(const T* source, std::ptrdiff_t step, T* turned, std::ptrdiff_t pitch) {
+    typedef T Quad __attribute__((vector_size(rows * sizeof(T))));
+    for (int j = 0; j < strip_lines; ++j) {
+        const T* first = source + j;
+        const Quad samples{first[0], first[step], first[2 * step], first[3 * step]};
+        std::memcpy(turned + j * pitch, &samples, sizeof samples);
+    }
+}
+
 // Copies the samples so that those of a line lie one after the other. A row of the image holds one sample of each
 // line, side by side; on diagonals they are a column farther right in the next row.
 template <class T>
@@ -125,15 +136,19 @@ void LineReader<T>::turn_rows(Strip<T>& strip) const {
     // Next samples of all lines lie in different sets of any cache.
     const int pitch = (height + 1023) / 1024 * 1024 + 16;
     strip.y.resize(static_cast<std::size_t>(pitch) * strip.lines.size() + padding);
-    for (int k = 0; k < height; ++k) {
+    constexpr int tile = 4;
+    for (int k = 0; k < height;) {
         const int col = left + slant * k;
         const auto source = static_cast<std::int64_t>(top + down * k) * image_.cols + col;
+        const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(down) * image_.cols + slant;  // to the next row
         T* turned = strip.y.data() + k;
-        if (count == strip_lines && col >= 0 && col + strip_lines <= image_.cols) {
-            for (int j = 0; j < strip_lines; ++j) turned[j * pitch] = image_.ordinate[source + j];
+        if (k + tile <= height && count == strip_lines && col >= 0 && col + slant * tile + strip_lines <= image_.cols) {
+            turn_tile<tile>(image_.ordinate + source, step, turned, pitch);
+            k += tile;
         } else {
             const int end = std::min(count, image_.cols - col);
             for (int j = std::max(0, -col); j < end; ++j) turned[j * pitch] = image_.ordinate[source + j];
+            ++k;
         }
     }
     for (int j = 0; j < count; ++j) {

@@ -74,7 +74,7 @@ struct Line {
     }
 };
 
-constexpr int strip_lines = 16;  // at most, in a strip: samples of a cache line
+constexpr int strip_lines = 32;  // at most, in a strip: samples of two cache lines
 
 // Neighbouring lines of one direction, and their samples where those do not lie in the image one after the other;
 // reused from strip to strip.

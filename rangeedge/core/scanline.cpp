@@ -162,26 +162,24 @@ void Splitter<T>::split() {
                 const Node& node = nodes_[static_cast<std::size_t>(pending_[i])];
                 worst_[i] = worst_of(lines_[static_cast<std::size_t>(node.line)], node.segment);
             }
-        // Without branches: which segments are cut cannot be foretold.
         std::size_t count = nodes_.size(), follow = 0;
         nodes_.resize(count + pending_.size());
         following_.resize(2 * pending_.size());
         for (std::size_t i = 0; i < pending_.size(); ++i) {
             Node& node = nodes_[static_cast<std::size_t>(pending_[i])];
             const Samples<T>& line = lines_[static_cast<std::size_t>(node.line)];
-            const bool split = worst_[i].residual > line.eps;
+            if (!(worst_[i].residual > line.eps)) continue;
             // The cut falls between two samples; the extreme one joins the neighbour it is closer to.
             const int k = worst_[i].at;
             const bool joins_left = std::abs(line.y[k] - line.y[k - 1]) <= std::abs(line.y[k + 1] - line.y[k]);
             const int cut = joins_left ? k : k - 1, right = static_cast<int>(count);
-            nodes_[count] = {{cut + 1, node.segment.last}, node.line, node.next};
+            nodes_[count++] = {{cut + 1, node.segment.last}, node.line, node.next};
             following_[follow] = pending_[i];
-            follow += static_cast<std::size_t>(split & (cut - node.segment.first >= exact));
+            follow += static_cast<std::size_t>(cut - node.segment.first >= exact);
             following_[follow] = right;
-            follow += static_cast<std::size_t>(split & (node.segment.last - cut > exact));
-            node.segment.last = split ? cut : node.segment.last;
-            node.next = split ? right : node.next;
-            count += static_cast<std::size_t>(split);
+            follow += static_cast<std::size_t>(node.segment.last - cut > exact);
+            node.segment.last = cut;
+            node.next = right;
         }
         nodes_.resize(count);
         following_.resize(follow);
