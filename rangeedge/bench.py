@@ -12,13 +12,13 @@ import numpy as np
 
 from . import __version__
 from ._args import integer
-from .detector import Selection, detectEdges, selected_of
+from .detector import detectEdges, selected_of
 from .distance import distanceTransform, salienceDistanceTransform
 from .edges import edgePoints, edgeStrength
 from .geometry import range_frame
 from .noise import estimateNoise
 from .seeds import extractSeeds
-from .selection import overallStrength
+from .selection import Selection, overallStrength
 from .thinning import thinEdges
 
 

@@ -32,7 +32,6 @@ from ._constants import (
     MEASURE_MIDPOINT,
 )
 from .batch import detect_file, detectBatch, read_image
-from .detector import Selection
 from .edges import ScanLineParams
 from .noise import NoiseModel
 from .regions import Growing, growRegions
@@ -47,6 +46,7 @@ from .results import (
     write_folder,
 )
 from .seeds import extractSeeds
+from .selection import Selection
 
 _INPUT = """A range image: 16-bit or float PNG, TIFF, PGM, EXR, PFM, NPY, NPZ, organized PCD or PLY,
 or a file of an ABW, Perceptron or Technical Arts scanner. With a pinhole camera give -K; without, the image is

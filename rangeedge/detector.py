@@ -22,10 +22,8 @@ from ._args import (
     error,
     errors_of,
     fail,
-    integer,
     number,
     pixel_size,
-    threshold,
 )
 from ._constants import EDGE_OCCLUDING
 from ._files import write_atomically
@@ -40,31 +38,11 @@ from .edges import (
 )
 from .geometry import RangeFrame
 from .noise import NoiseModel
-from .selection import at_least, selectEdges
+from .selection import Selection, at_least, selected
 from .thinning import thinEdges
 
 _SUFFIXES = (".xml", ".yml", ".yaml", ".json")  # by which cv2.FileStorage knows the format
 _OPENING, _CLOSING = "savedBy", "complete"  # the first and the last key of a file that `save` has written
-
-
-class Selection(NamedTuple):
-    """Which strengths make an edge, with the defaults of `detectEdges`."""
-
-    jumpThreshold: float | None = None
-    creaseThreshold: float = 30.0
-    hysteresis: float = 1.0
-    minLength: int = 5
-    dynamic: bool = False
-
-    def checked(self, func: str) -> Selection:
-        """The same with every value of its own type; an error names `func`."""
-        return Selection(
-            0.0 if self.jumpThreshold is None else threshold(func, "jumpThreshold", self.jumpThreshold),
-            threshold(func, "creaseThreshold", self.creaseThreshold),
-            number(func, "hysteresis", self.hysteresis, 0, 1, above=True),
-            integer(func, "minLength", self.minLength, 1),
-            boolean(func, "dynamic", self.dynamic),
-        )
 
 
 _DEFAULT = Selection()
@@ -173,9 +151,9 @@ def found_edges(func: str, frame: RangeFrame, params: ScanLineParams, selection:
 
 def selected_of(strength: EdgeStrength, selection: Selection) -> np.ndarray:
     """The edge map before thinning: jumps on their nearer side, and creases that do not stand alone."""
-    jump = np.where(strength.kind & EDGE_OCCLUDING, strength.jump, np.float32(0))
+    jump = cv2.copyTo(strength.jump, cv2.bitwise_and(strength.kind, EDGE_OCCLUDING))
     crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold)
-    return selectEdges(jump, crease, **selection._asdict())
+    return selected(jump, crease, selection)
 
 
 def _unfrayed(crease: np.ndarray, least: float) -> np.ndarray:
@@ -187,7 +165,7 @@ def _unfrayed(crease: np.ndarray, least: float) -> np.ndarray:
         return crease
     strong = at_least(crease, least).view(np.uint8)
     around = cv2.boxFilter(strong, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    return np.where(around >= 4, crease, np.float32(0))
+    return cv2.copyTo(crease, cv2.compare(around, 4, cv2.CMP_GE))
 
 
 def createScanLineDetector(params: ScanLineParams | None = None) -> ScanLineDetector:

@@ -113,9 +113,7 @@ def _lengths(func: str, src: np.ndarray, depthFactor: float) -> np.ndarray:
     return lengths
 
 
-def _pinhole(
-    func: str, src: np.ndarray, depthFactor: float, inside: np.ndarray | None, K: np.ndarray
-) -> RangeFrame:
+def _pinhole(func: str, src: np.ndarray, depthFactor: float, inside: np.ndarray | None, K: np.ndarray) -> RangeFrame:
     # The kernel divides by the factor what depth cameras give; other integers are divided here.
     depth = np.ascontiguousarray(src) if src.dtype == np.uint16 else _lengths(func, src, depthFactor)
     inverse = np.empty(depth.shape, np.float32 if depth.dtype == np.uint16 else depth.dtype)

@@ -8,12 +8,13 @@ import numpy as np
 
 from . import _core
 from ._args import boolean, image8, integer, labels32s, number
-from .detector import Selection, found_edges
+from .detector import found_edges
 from .distance import distanceTransform
 from .edges import ScanLineParams
 from .geometry import RangeFrame, range_frame
 from .noise import kernel_noise, noise_of
 from .seeds import extractSeeds, label_statistics, seeding
+from .selection import Selection
 from .surfaces import surface_map, surfaces_of
 
 

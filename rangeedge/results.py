@@ -18,13 +18,14 @@ import cv2
 import numpy as np
 
 from ._args import described, error
-from .detector import Selection, found_edges
+from .detector import found_edges
 from .distance import distanceTransform
 from .draw import drawOverview, region_overview
 from .edges import EdgeStrength, ScanLineParams, frame_of, params_of, points_of
 from .geometry import RangeFrame
 from .noise import noise_of
 from .regions import Growing, described_regions, seeded_regions
+from .selection import Selection
 
 _REPORT = "report.json"
 _LABELS = 65535  # that 16 bits hold

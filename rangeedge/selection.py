@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import cv2
 import numpy as np
 
-from . import _args
+from . import _args, _core
 
 _CHAIN_ALPHA = 6.0  # Venkatesh and Rosin: how many deviations above the population an edge must stand
 _CHAIN_POPULATION = 10  # fewer chains than this have no statistics to speak of
@@ -186,23 +188,43 @@ def selectEdges(
     func = "selectEdges"
     jump = _args.strength32f(func, "jump", jump)
     crease = _args.strength32f(func, "crease", crease, jump.shape)
-    thresholds = (
-        _args.threshold(func, "jumpThreshold", jumpThreshold),
-        _args.threshold(func, "creaseThreshold", creaseThreshold),
-    )
-    hysteresis = _args.number(func, "hysteresis", hysteresis, 0, 1, above=True)
-    minLength = _args.integer(func, "minLength", minLength, 1)
-    dynamic = _args.boolean(func, "dynamic", dynamic)
+    jumpThreshold = _args.threshold(func, "jumpThreshold", jumpThreshold)
+    selection = Selection(jumpThreshold, creaseThreshold, hysteresis, minLength, dynamic).checked(func)
+    return _args.deliver(func, "dst", selected(jump, crease, selection), dst)
 
+
+class Selection(NamedTuple):
+    """Which strengths make an edge, with the defaults of `detectEdges`."""
+
+    jumpThreshold: float | None = None
+    creaseThreshold: float = 30.0
+    hysteresis: float = 1.0
+    minLength: int = 5
+    dynamic: bool = False
+
+    def checked(self, func: str) -> Selection:
+        """The same with every value of its own type; an error names `func`."""
+        return Selection(
+            0.0 if self.jumpThreshold is None else _args.threshold(func, "jumpThreshold", self.jumpThreshold),
+            _args.threshold(func, "creaseThreshold", self.creaseThreshold),
+            _args.number(func, "hysteresis", self.hysteresis, 0, 1, above=True),
+            _args.integer(func, "minLength", self.minLength, 1),
+            _args.boolean(func, "dynamic", self.dynamic),
+        )
+
+
+def selected(jump: np.ndarray, crease: np.ndarray, selection: Selection) -> np.ndarray:
+    """The edge map, 0 and 255, of checked strengths by checked parameters."""
+    thresholds, hysteresis = (selection.jumpThreshold, selection.creaseThreshold), selection.hysteresis
     edges = _reaching(jump, crease, thresholds)
     if hysteresis < 1:
         low = (hysteresis * thresholds[0], hysteresis * thresholds[1])
         edges = _connected_to(edges, _reaching(jump, crease, low))
-    if minLength > 1:
-        edges = _long_components(edges, minLength)
-    if dynamic:
+    if selection.minLength > 1:
+        edges = _long_components(edges, selection.minLength)
+    if selection.dynamic:
         edges &= _outstanding(jump) | _outstanding(crease)
-    return _args.deliver(func, "dst", edges.view(np.uint8) * np.uint8(255), dst)
+    return edges.view(np.uint8) * np.uint8(255)
 
 
 def _grey_levels(strength: np.ndarray, cut: float) -> np.ndarray:
@@ -236,9 +258,9 @@ def _connected_to(strong: np.ndarray, candidates: np.ndarray) -> np.ndarray:
 
 def _long_components(edges: np.ndarray, minLength: int) -> np.ndarray:
     """The 8-connected components whose bounding box has a side of at least `minLength`."""
-    _, labels, stats, _ = cv2.connectedComponentsWithStats(edges.view(np.uint8))
-    extent = stats[:, [cv2.CC_STAT_WIDTH, cv2.CC_STAT_HEIGHT]].max(axis=1)
-    return _pixels_of(edges, labels, extent >= minLength)
+    kept = np.empty(edges.shape, np.uint8)
+    _core.long_components(edges.view(np.uint8), minLength, kept)
+    return kept.view(bool)
 
 
 def _pixels_of(edges: np.ndarray, labels: np.ndarray, keep: np.ndarray) -> np.ndarray:

@@ -395,9 +395,7 @@ class Detector:
         while True:
             costs = [self._cost(line, *pair) for pair in pairwise(segments)]
             around = [math.inf, *costs, math.inf]
-            chosen = [
-                i for i, cost in enumerate(costs) if cost < limit and cost < around[i] and cost <= around[i + 2]
-            ]
+            chosen = [i for i, cost in enumerate(costs) if cost < limit and cost < around[i] and cost <= around[i + 2]]
             if not chosen:
                 return segments
             for i in reversed(chosen):

@@ -25,7 +25,8 @@ from rangeedge import (
     selectEdges,
     thinEdges,
 )
-from rangeedge.detector import ScanLineDetector, Selection, selected_of
+from rangeedge.detector import ScanLineDetector, selected_of
+from rangeedge.selection import Selection
 
 K = np.array([[200, 0, 47.5], [0, 210, 35.5], [0, 0, 1]])
 FORMATS = ["xml", "yml", "yaml", "json"]

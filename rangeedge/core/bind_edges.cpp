@@ -11,6 +11,7 @@
 #include "edges.hpp"
 #include "noise.hpp"
 #include "scanline.hpp"
+#include "selection.hpp"
 #include "simd.hpp"
 
 namespace nb = nanobind;
@@ -158,6 +159,14 @@ void bind_edges(nb::module_& m) {
             },
             nb::kw_only(), "eps"_a, "eps_factor"_a, "directions"_a, "interpolate"_a, "endpoint"_a, "normals"_a, "max_shift"_a,
             "max_gap"_a, "merge_significance"_a, "min_significance"_a, "threads"_a);
+    m.def(
+        "long_components",
+        [](In<std::uint8_t> edges, int min_length, Out<std::uint8_t> kept) {
+            nb::gil_scoped_release release;
+            long_components(edges.data(), static_cast<int>(edges.shape(0)), static_cast<int>(edges.shape(1)), min_length,
+                            kept.data());
+        },
+        "edges"_a.noconvert(), "min_length"_a, "kept"_a.noconvert());
     define<float>(m);
     define<double>(m);
     define_inverse<float, float>(m);

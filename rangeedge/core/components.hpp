@@ -1,9 +1,11 @@
-// 4-connected components of an image, as runs of pixels in rows.
+// Connected components of an image, as runs of pixels in rows.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <utility>
 #include <vector>
 
@@ -22,9 +24,10 @@ public:
         const Run* end() const { return last; }
     };
 
+    // `connectivity` is 4 or 8.
     template <class T>
-    Components(const T* image, int rows, int cols) {
-        const int stride = cols + 2;
+    Components(const T* image, int rows, int cols, int connectivity = 4) {
+        const int stride = cols + 2, reach = connectivity == 8;
         std::vector<Run> found;
         std::vector<int> parent;  // of runs; roots are first in raster order
         const auto root = [&](std::size_t i) {
@@ -39,12 +42,8 @@ public:
         for (int row = 0; row < rows; ++row) {
             const std::size_t row_begin = found.size();
             int p = (row + 1) * stride + 1;
-            for (const int end = p + cols; p < end;) {
+            for (const int end = p + cols; (p = find_value(image, p, end)) < end;) {
                 const T value = image[p];
-                if (!value) {
-                    ++p;
-                    continue;
-                }
                 const Run run{p, [&] {
                                   while (image[p] == value) ++p;
                                   return p;
@@ -52,8 +51,8 @@ public:
                 const std::size_t i = found.size();
                 found.push_back(run);
                 parent.push_back(static_cast<int>(i));
-                while (above < row_begin && found[above].end + stride <= run.begin) ++above;
-                for (std::size_t k = above; k < row_begin && found[k].begin + stride < run.end; ++k) {
+                while (above < row_begin && found[above].end + stride + reach <= run.begin) ++above;
+                for (std::size_t k = above; k < row_begin && found[k].begin + stride < run.end + reach; ++k) {
                     if (image[found[k].begin] != value) continue;
                     const auto [low, high] = std::minmax({root(k), root(i)});
                     parent[static_cast<std::size_t>(high)] = low;
@@ -73,6 +72,16 @@ public:
     }
 
 private:
+    // The first pixel from p, and before `end`, that is not 0; else `end`.
+    template <class T>
+    static int find_value(const T* image, int p, int end) {
+        std::uint64_t word;
+        constexpr int step = sizeof word / sizeof(T);
+        while (p + step <= end && (std::memcpy(&word, image + p, sizeof word), !word)) p += step;
+        while (p < end && !image[p]) ++p;
+        return p;
+    }
+
     void sort(const std::vector<Run>& found, std::vector<int>& parent) {
         std::vector<std::size_t> sizes;
         for (std::size_t i = 0; i < found.size(); ++i) {

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "selection.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "components.hpp"
+
+namespace rangeedge {
+
+void long_components(const std::uint8_t* edges, int rows, int cols, int min_length, std::uint8_t* kept) {
+    const auto stride = static_cast<std::size_t>(cols) + 2, width = static_cast<std::size_t>(cols);
+    std::vector<std::uint8_t> image(stride * (static_cast<std::size_t>(rows) + 2), 0);
+    for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row)
+        for (std::size_t col = 0; col < width; ++col) image[(row + 1) * stride + col + 1] = edges[row * width + col] != 0;
+    std::fill_n(kept, static_cast<std::size_t>(rows) * width, std::uint8_t{0});
+    const Components parts(image.data(), rows, cols, 8);
+    for (int i = 0; i < parts.count(); ++i) {
+        int left = cols, right = -1, top = rows, bottom = -1;
+        const auto row_of = [&](int p) { return p / (cols + 2) - 1; };
+        for (const auto [begin, end] : parts.runs(i)) {
+            const int first = begin - (row_of(begin) + 1) * (cols + 2) - 1;
+            left = std::min(left, first), right = std::max(right, first + end - begin - 1);
+            top = std::min(top, row_of(begin)), bottom = std::max(bottom, row_of(begin));
+        }
+        if (std::max(right - left, bottom - top) + 1 < min_length) continue;
+        for (const auto [begin, end] : parts.runs(i)) {
+            const int row = row_of(begin), first = begin - (row + 1) * (cols + 2) - 1;
+            std::fill_n(kept + static_cast<std::size_t>(row) * width + first, end - begin, std::uint8_t{1});
+        }
+    }
+}
+
+}  // namespace rangeedge
