@@ -126,6 +126,7 @@ void define(nb::module_& m) {
             {
                 nb::gil_scoped_release release;
                 candidates = detect(range_image(src, projective, to_plane, axis), noise_model(noise, noise_map), parameters);
+                put_in_order(candidates);
             }
             return columns(candidates);
         },

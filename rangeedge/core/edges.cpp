@@ -172,16 +172,22 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
             part.end = own.size();
         }
     });
-    std::size_t size = 0;
-    for (const auto& own : found) size += own.size();
-    std::vector<Candidate> candidates;
-    candidates.reserve(size);
+    std::vector<Cells::Span> spans;
+    std::int32_t order = 0;
     for (const Part& part : parts) {
-        const Candidate* own = found[static_cast<std::size_t>(part.thread)].data();
-        candidates.insert(candidates.end(), own + part.begin, own + part.end);
+        Candidate* own = found[static_cast<std::size_t>(part.thread)].data();
+        spans.push_back({own + part.begin, own + part.end});
+        for (Candidate* c = own + part.begin; c != own + part.end; ++c) c->order = order++;
     }
-    pool(candidates, image, parameters, team);
+    Cells cells(image.rows, image.cols);
+    std::vector<Candidate> candidates = cells.sort(spans);
+    found.clear();
+    pool(candidates, cells, image, parameters, team);
     return candidates;
+}
+
+void put_in_order(std::vector<Candidate>& candidates) {
+    std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
 }
 
 void combine(const std::vector<Candidate>& candidates, float* jump, float* crease, std::uint8_t* kind,

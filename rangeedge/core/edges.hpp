@@ -59,13 +59,17 @@ struct Candidate {
     float significance;          // joined with that of its neighbours
     std::uint8_t kind, direction;
     std::int32_t before, after;  // linear indices of the pixels on either side
+    std::int32_t order;          // by direction, then by line, then along the line
     Side sides[2];
     float place[2], along[2];    // position and direction of the line in the plane of the image
 };
 
-// All candidates, direction by direction, line by line; the same for any number of threads.
+// All candidates, by their place in the image; the same for any number of threads.
 template <class T>
 std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters);
+
+// Brings them into their order along directions and lines.
+void put_in_order(std::vector<Candidate>& candidates);
 
 // Largest strengths per pixel; the kind of a crease comes with its largest angle. The outputs hold zeros before.
 void combine(const std::vector<Candidate>& candidates, float* jump, float* crease, std::uint8_t* kind,

@@ -12,7 +12,7 @@ namespace rangeedge {
 namespace {
 
 constexpr double degrees = 57.295779513082320877;
-constexpr float reach = 4;             // pixels; weights fall from 1 at the candidate itself to 0 there
+constexpr float reach = Cells::size;   // pixels; weights fall from 1 at the candidate itself to 0 there
 constexpr float capped = 8;            // a single candidate's share of the evidence
 constexpr float lone = 1 / 3.0f;       // what a candidate without neighbours is worth
 constexpr float precise = 1e30f;       // at most so much does a slope count
@@ -27,37 +27,26 @@ enum TangentField {
     fields_of_tangents = value + 2
 };
 
-// Candidates by square cells of the image, in arrays that may be read a few lanes beyond their end.
+// What sums over neighbours need of candidates sorted by cells, in arrays that may be read a few lanes beyond their end.
 class Grid {
 public:
-    Grid(const std::vector<Candidate>& candidates, int rows, int cols, int fields)
-        : rows_(rows / cell_size + 1), cols_(cols / cell_size + 1), stride_(candidates.size() + lanes),
-          start_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(cols_) + 1, 0), order_(candidates.size()),
-          kinds_(stride_, 0), fields_(stride_ * static_cast<std::size_t>(fields), 0.0f) {
-        for (const Candidate& c : candidates) ++start_[cell(column(c), row(c)) + 1];
-        for (std::size_t p = 1; p < start_.size(); ++p) start_[p] += start_[p - 1];
-        std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
-        for (std::size_t i = 0; i < candidates.size(); ++i) {
-            const Candidate& c = candidates[i];
-            const auto k = static_cast<std::size_t>(next[cell(column(c), row(c))]++);
-            order_[k] = static_cast<std::int32_t>(i);
-            kinds_[k] = c.kind & kinds;
-            field(x_field)[k] = c.x;
-            field(y_field)[k] = c.y;
+    Grid(const std::vector<Candidate>& candidates, const Cells& cells, int fields)
+        : cells_(cells), stride_(candidates.size() + lanes), kinds_(stride_, 0),
+          fields_(stride_ * static_cast<std::size_t>(fields), 0.0f) {
+        for (std::size_t k = 0; k < candidates.size(); ++k) {
+            kinds_[k] = candidates[k].kind & kinds;
+            field(x_field)[k] = candidates[k].x;
+            field(y_field)[k] = candidates[k].y;
         }
     }
 
     float* field(int f) { return fields_.data() + stride_ * static_cast<std::size_t>(f); }
     const float* field(int f) const { return fields_.data() + stride_ * static_cast<std::size_t>(f); }
-    // Calls visit(index of a candidate, its place in the arrays) for all.
-    template <class Visit>
-    void for_each(Visit&& visit) const {
-        for (std::size_t k = 0; k < order_.size(); ++k) visit(static_cast<std::size_t>(order_[k]), k);
-    }
-    // From now on the candidate at place k is nobody's neighbour.
+    const int* kinds_of_all() const { return kinds_.data(); }
+    // From now on candidate k is nobody's neighbour.
     void remove(std::size_t k) { kinds_[k] = 0; }
 
-    // A candidate and the places, in three rows of cells, where its neighbours are.
+    // A candidate and those, in three rows of cells, among which its neighbours are.
     struct Near {
         const Grid* grid;
         float x, y;
@@ -65,62 +54,51 @@ public:
         int first[3], last[3];
     };
 
-    // Calls visit(index, neighbours) for all candidates, several rows of cells at a time.
+    // Calls visit(k, near) for all candidates, several rows of cells at a time.
     template <class Visit>
     void for_each_near(Team& team, Visit&& visit) const {
         std::atomic<int> taken{0};
         team.run([&](int) {
-            for (int v; (v = taken++) < rows_;)
-                for (int u = 0; u < cols_; ++u) visit_cell(u, v, visit);
+            for (int row; (row = taken++) < cells_.rows();)
+                for (int col = 0; col < cells_.cols(); ++col) visit_cell(col, row, visit);
         });
     }
 
-    const int* kinds_of_places() const { return kinds_.data(); }
-
 private:
-    static constexpr int cell_size = 4;  // pixels, no less than the reach
-
     template <class Visit>
-    void visit_cell(int u, int v, Visit&& visit) const {
-        const int begin = start_[cell(u, v)], end = start_[cell(u, v) + 1];
+    void visit_cell(int col, int row, Visit&& visit) const {
+        const int begin = cells_.begin(col, row), end = cells_.end(col, row);
         if (begin == end) return;
         Near near{this, 0, 0, 0, {}, {}};
-        const int left = std::max(0, u - 1), right = std::min(cols_ - 1, u + 1);
+        const int left = std::max(0, col - 1), right = std::min(cells_.cols() - 1, col + 1);
         for (int i = 0; i < 3; ++i) {
-            const int y = v + i - 1;
-            if (y < 0 || y >= rows_) continue;
-            near.first[i] = start_[cell(left, y)];
-            near.last[i] = start_[cell(right, y) + 1];
+            const int y = row + i - 1;
+            if (y < 0 || y >= cells_.rows()) continue;
+            near.first[i] = cells_.begin(left, y);
+            near.last[i] = cells_.end(right, y);
         }
         for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
             near.x = field(x_field)[k];
             near.y = field(y_field)[k];
             near.kinds = kinds_[k];
-            visit(static_cast<std::size_t>(order_[k]), near);
+            visit(k, near);
         }
     }
 
-    int column(const Candidate& c) const { return std::min(std::max(static_cast<int>(c.x) / cell_size, 0), cols_ - 1); }
-    int row(const Candidate& c) const { return std::min(std::max(static_cast<int>(c.y) / cell_size, 0), rows_ - 1); }
-    std::size_t cell(int column, int row) const {
-        return static_cast<std::size_t>(row) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(column);
-    }
-
-    int rows_, cols_;
+    const Cells& cells_;
     std::size_t stride_;
-    std::vector<std::int32_t> start_, order_;
     std::vector<int> kinds_;
     std::vector<float> fields_;
 };
 
-// Calls visit(k, weights, dx, dy) for the places k, k + 1, ... of several candidates at a time: their distances from
+// Calls visit(k, weights, dx, dy) for the candidates k, k + 1, ... several at a time: their distances from
 // the one they are near, and weights that fall with these and are 0 for those beyond reach or of another kind.
 template <int bytes, class Visit>
 RANGEEDGE_INLINE void for_each_lanes(const Grid::Near& near, Visit&& visit) {
     using F = Floats<bytes>;
     using I = Ints<bytes>;
     const float *x = near.grid->field(x_field), *y = near.grid->field(y_field);
-    const int* kinds_there = near.grid->kinds_of_places();
+    const int* kinds_there = near.grid->kinds_of_all();
     const F cx = F::all(near.x), cy = F::all(near.y), one = F::all(1), share = F::all(1 / (reach * reach));
     const F half = F::all(0.5f);
     const I own = I::all(near.kinds), none = I::all(0);
@@ -170,8 +148,8 @@ struct CommonLine {
 
 CommonLine common_line(const Grid::Near& near) {
     const PlaceSums sums = place_sums(near);
-    const double n = sums.n, mx = sums.x / n, my = sums.y / n;
-    const double sxx = sums.xx / n - mx * mx, sxy = sums.xy / n - mx * my, syy = sums.yy / n - my * my;
+    const double share = 1 / double{sums.n}, mx = sums.x * share, my = sums.y * share;
+    const double sxx = sums.xx * share - mx * mx, sxy = sums.xy * share - mx * my, syy = sums.yy * share - my * my;
     // The line runs at half the angle of (sxx - syy, 2 sxy).
     const double spread = std::sqrt((sxx - syy) * (sxx - syy) + 4 * sxy * sxy);
     const double cosine = spread > 0 ? (sxx - syy) / spread : 1, sine = spread > 0 ? 2 * sxy / spread : 0;
@@ -282,10 +260,10 @@ double normal_angle(const Grid::Near& near, bool projective) {
 }
 
 // The grid of candidates with what `normal_angle` asks of them.
-Grid tangents_of(const std::vector<Candidate>& candidates, int rows, int cols) {
-    Grid grid(candidates, rows, cols, fields_of_tangents);
-    grid.for_each([&](std::size_t i, std::size_t k) {
-        const Candidate& c = candidates[i];
+Grid tangents_of(const std::vector<Candidate>& candidates, const Cells& cells) {
+    Grid grid(candidates, cells, fields_of_tangents);
+    for (std::size_t k = 0; k < candidates.size(); ++k) {
+        const Candidate& c = candidates[k];
         const Step step = step_of(c);
         grid.field(along_x)[k] = c.along[0], grid.field(along_y)[k] = c.along[1];
         grid.field(step_x)[k] = static_cast<float>(step.dcol), grid.field(step_y)[k] = static_cast<float>(step.drow);
@@ -297,46 +275,61 @@ Grid tangents_of(const std::vector<Candidate>& candidates, int rows, int cols) {
             grid.field(slope + side)[k] = s.slope;
             grid.field(value + side)[k] = s.value;
         }
-    });
+    }
     return grid;
 }
 
 }  // namespace
 
+std::vector<Candidate> Cells::sort(const std::vector<Span>& spans) {
+    start_.assign(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(cols_) + 1, 0);
+    for (const Span& span : spans)
+        for (const Candidate* c = span.first; c != span.last; ++c) ++start_[cell_of(*c) + 1];
+    for (std::size_t i = 1; i < start_.size(); ++i) start_[i] += start_[i - 1];
+    std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
+    std::vector<Candidate> sorted(static_cast<std::size_t>(start_.back()));
+    for (const Span& span : spans)
+        for (const Candidate* c = span.first; c != span.last; ++c) sorted[static_cast<std::size_t>(next[cell_of(*c)]++)] = *c;
+    return sorted;
+}
+
 template <class T>
-void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const Parameters& parameters, Team& team) {
+void pool(std::vector<Candidate>& candidates, Cells& cells, const RangeImage<T>& image, const Parameters& parameters,
+          Team& team) {
     const auto least = static_cast<float>(parameters.min_significance);
     const bool aligned = parameters.max_shift > 0;
     if (!(least > 0 || aligned || parameters.normals)) return;
-    Grid grid(candidates, image.rows, image.cols, fields_of_lines);
-    grid.for_each([&](std::size_t i, std::size_t k) {
-        const float s = std::min(candidates[i].significance, capped);
-        grid.field(evidence_field)[k] = s * s;
-    });
-    grid.for_each_near(team, [&](std::size_t i, const Grid::Near& near) {
-        Candidate& c = candidates[i];
-        c.significance = std::max(std::sqrt(evidence(near)), c.significance * lone);
-    });
     const auto weak = [&](const Candidate& c) { return c.significance < least; };
-    if (aligned) {
-        grid.for_each([&](std::size_t i, std::size_t k) {
-            if (weak(candidates[i])) grid.remove(k);
+    {
+        Grid grid(candidates, cells, fields_of_lines);
+        for (std::size_t k = 0; k < candidates.size(); ++k) {
+            const float s = std::min(candidates[k].significance, capped);
+            grid.field(evidence_field)[k] = s * s;
+        }
+        grid.for_each_near(team, [&](std::size_t k, const Grid::Near& near) {
+            Candidate& c = candidates[k];
+            c.significance = std::max(std::sqrt(evidence(near)), c.significance * lone);
         });
-        grid.for_each_near(team, [&](std::size_t i, const Grid::Near& near) {
-            if (!weak(candidates[i])) align(candidates[i], near, image, parameters.max_shift);
-        });
+        if (aligned) {
+            for (std::size_t k = 0; k < candidates.size(); ++k)
+                if (weak(candidates[k])) grid.remove(k);
+            grid.for_each_near(team, [&](std::size_t k, const Grid::Near& near) {
+                if (!weak(candidates[k])) align(candidates[k], near, image, parameters.max_shift);
+            });
+        }
     }
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), weak), candidates.end());
+    candidates = cells.sort({{candidates.data(), candidates.data() + candidates.size()}});
     if (!parameters.normals) return;
-    const Grid tangents = tangents_of(candidates, image.rows, image.cols);
-    tangents.for_each_near(team, [&](std::size_t i, const Grid::Near& near) {
-        Candidate& c = candidates[i];
+    const Grid tangents = tangents_of(candidates, cells);
+    tangents.for_each_near(team, [&](std::size_t k, const Grid::Near& near) {
+        Candidate& c = candidates[k];
         const double angle = c.crease > 0 ? normal_angle(near, image.projective) : -1;
         if (angle >= 0) c.crease = static_cast<float>(angle);
     });
 }
 
-template void pool(std::vector<Candidate>&, const RangeImage<float>&, const Parameters&, Team&);
-template void pool(std::vector<Candidate>&, const RangeImage<double>&, const Parameters&, Team&);
+template void pool(std::vector<Candidate>&, Cells&, const RangeImage<float>&, const Parameters&, Team&);
+template void pool(std::vector<Candidate>&, Cells&, const RangeImage<double>&, const Parameters&, Team&);
 
 }  // namespace rangeedge
