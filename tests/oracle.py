@@ -655,7 +655,8 @@ def edge_strength(image, candidates):
         for (u, v), occluding in zip(c.pixels, (EDGE_OCCLUDING, EDGE_OCCLUDED), strict=True):
             if c.kind & EDGE_JUMP:
                 kind[v, u] |= EDGE_JUMP | (EDGE_OCCLUDING if c.kind & occluding else EDGE_OCCLUDED)
-            if np.float32(c.crease) > np.float32(crease[v, u]):
+            angle, largest = np.float32(c.crease), np.float32(crease[v, u])
+            if angle > largest or (angle == largest and c.kind & EDGE_CONVEX):
                 crease[v, u] = c.crease
                 kind[v, u] &= ~np.uint8(EDGE_CONVEX | EDGE_CONCAVE)
                 kind[v, u] |= c.kind & (EDGE_CONVEX | EDGE_CONCAVE)

@@ -146,43 +146,38 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
     // Neighbouring lines of one direction. Any thread may take any part: they are many, and what they cost differs.
     struct Part {
         int direction, first, count;
-        int thread;  // whose candidates from begin to end are of this part
-        std::size_t begin, end;
+        std::vector<Candidate> found;
     };
     std::vector<Part> parts;
     for (const int direction : {rows_bit, cols_bit, diag45_bit, diag135_bit}) {
         const int lines = parameters.directions & direction ? line_count(direction, image.rows, image.cols) : 0;
         for (int first = 0; first < lines; first += strip_lines)
-            parts.push_back({direction, first, std::min(strip_lines, lines - first), 0, 0, 0});
+            parts.push_back({direction, first, std::min(strip_lines, lines - first), {}});
     }
     Team team(parameters.threads);
-    std::vector<std::vector<Candidate>> found(static_cast<std::size_t>(team.size()));
     std::atomic<std::size_t> taken{0};
-    team.run([&](int thread) {
+    team.run([&](int) {
         Strip<T> strip;
         Approximator<T> approximator(parameters);
-        auto& own = found[static_cast<std::size_t>(thread)];
+        std::vector<Candidate> found;
         for (std::size_t i; (i = taken++) < parts.size();) {
             Part& part = parts[i];
             const LineDetector<T> detector(image, noise, parameters, part.direction);
             detector.read(part.first, part.count, strip);
-            part.thread = thread;
-            part.begin = own.size();
-            detector.detect(strip, approximator, own);
-            part.end = own.size();
+            found.clear();
+            detector.detect(strip, approximator, found);
+            part.found.assign(found.begin(), found.end());
         }
     });
-    std::vector<Cells::Span> spans;
     std::int32_t order = 0;
-    for (const Part& part : parts) {
-        Candidate* own = found[static_cast<std::size_t>(part.thread)].data();
-        spans.push_back({own + part.begin, own + part.end});
-        for (Candidate* c = own + part.begin; c != own + part.end; ++c) c->order = order++;
-    }
+    for (Part& part : parts)
+        for (Candidate& c : part.found) c.order = order++;
+    std::vector<Candidate> candidates(static_cast<std::size_t>(order));
     Cells cells(image.rows, image.cols);
-    std::vector<Candidate> candidates = cells.sort(spans);
-    found.clear();
-    pool(candidates, cells, image, parameters, team);
+    for (const Part& part : parts) cells.count(part.found);
+    for (const Part& part : parts) cells.place(part.found, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
+    parts.clear();
+    pool(candidates, image, parameters, team);
     return candidates;
 }
 
@@ -197,7 +192,7 @@ void combine(const std::vector<Candidate>& candidates, float* jump, float* creas
             const bool nearer = ((c.kind & occluding_bit) != 0) == (p == c.before);
             if (c.kind & jump_bit)
                 kind[p] = static_cast<std::uint8_t>(kind[p] | jump_bit | (nearer ? occluding_bit : occluded_bit));
-            if (c.crease > crease[p]) {
+            if (c.crease > crease[p] || (c.crease == crease[p] && (c.kind & convex_bit))) {
                 crease[p] = c.crease;
                 const int other = kind[p] & ~(convex_bit | concave_bit);
                 kind[p] = static_cast<std::uint8_t>(other | (c.kind & (convex_bit | concave_bit)));

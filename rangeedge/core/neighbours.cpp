@@ -27,26 +27,33 @@ enum TangentField {
     fields_of_tangents = value + 2
 };
 
-// What sums over neighbours need of candidates sorted by cells, in arrays that may be read a few lanes beyond their end.
+// What sums over neighbours need of candidates, by cells, in arrays that may be read a few lanes beyond their end.
 class Grid {
 public:
-    Grid(const std::vector<Candidate>& candidates, const Cells& cells, int fields)
-        : cells_(cells), stride_(candidates.size() + lanes), kinds_(stride_, 0),
+    Grid(const std::vector<Candidate>& candidates, int rows, int cols, int fields)
+        : cells_(rows, cols), stride_(candidates.size() + lanes), order_(candidates.size()), kinds_(stride_, 0),
           fields_(stride_ * static_cast<std::size_t>(fields), 0.0f) {
-        for (std::size_t k = 0; k < candidates.size(); ++k) {
-            kinds_[k] = candidates[k].kind & kinds;
-            field(x_field)[k] = candidates[k].x;
-            field(y_field)[k] = candidates[k].y;
-        }
+        cells_.count(candidates);
+        cells_.place(candidates, [&](const Candidate& c, std::size_t k) {
+            order_[k] = static_cast<std::int32_t>(&c - candidates.data());
+            kinds_[k] = c.kind & kinds;
+            field(x_field)[k] = c.x;
+            field(y_field)[k] = c.y;
+        });
     }
 
     float* field(int f) { return fields_.data() + stride_ * static_cast<std::size_t>(f); }
     const float* field(int f) const { return fields_.data() + stride_ * static_cast<std::size_t>(f); }
     const int* kinds_of_all() const { return kinds_.data(); }
-    // From now on candidate k is nobody's neighbour.
+    // Calls visit(index of a candidate, its place in the arrays) for all.
+    template <class Visit>
+    void for_each(Visit&& visit) const {
+        for (std::size_t k = 0; k < order_.size(); ++k) visit(static_cast<std::size_t>(order_[k]), k);
+    }
+    // From now on the candidate at place k is nobody's neighbour.
     void remove(std::size_t k) { kinds_[k] = 0; }
 
-    // A candidate and those, in three rows of cells, among which its neighbours are.
+    // A candidate and the places, in three rows of cells, where its neighbours are.
     struct Near {
         const Grid* grid;
         float x, y;
@@ -54,7 +61,7 @@ public:
         int first[3], last[3];
     };
 
-    // Calls visit(k, near) for all candidates, several rows of cells at a time.
+    // Calls visit(index, near) for all candidates, several rows of cells at a time.
     template <class Visit>
     void for_each_near(Team& team, Visit&& visit) const {
         std::atomic<int> taken{0};
@@ -81,12 +88,13 @@ private:
             near.x = field(x_field)[k];
             near.y = field(y_field)[k];
             near.kinds = kinds_[k];
-            visit(k, near);
+            visit(static_cast<std::size_t>(order_[k]), near);
         }
     }
 
-    const Cells& cells_;
+    Cells cells_;
     std::size_t stride_;
+    std::vector<std::int32_t> order_;
     std::vector<int> kinds_;
     std::vector<float> fields_;
 };
@@ -260,10 +268,10 @@ double normal_angle(const Grid::Near& near, bool projective) {
 }
 
 // The grid of candidates with what `normal_angle` asks of them.
-Grid tangents_of(const std::vector<Candidate>& candidates, const Cells& cells) {
-    Grid grid(candidates, cells, fields_of_tangents);
-    for (std::size_t k = 0; k < candidates.size(); ++k) {
-        const Candidate& c = candidates[k];
+Grid tangents_of(const std::vector<Candidate>& candidates, int rows, int cols) {
+    Grid grid(candidates, rows, cols, fields_of_tangents);
+    grid.for_each([&](std::size_t i, std::size_t k) {
+        const Candidate& c = candidates[i];
         const Step step = step_of(c);
         grid.field(along_x)[k] = c.along[0], grid.field(along_y)[k] = c.along[1];
         grid.field(step_x)[k] = static_cast<float>(step.dcol), grid.field(step_y)[k] = static_cast<float>(step.drow);
@@ -275,61 +283,48 @@ Grid tangents_of(const std::vector<Candidate>& candidates, const Cells& cells) {
             grid.field(slope + side)[k] = s.slope;
             grid.field(value + side)[k] = s.value;
         }
-    }
+    });
     return grid;
 }
 
 }  // namespace
 
-std::vector<Candidate> Cells::sort(const std::vector<Span>& spans) {
-    start_.assign(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(cols_) + 1, 0);
-    for (const Span& span : spans)
-        for (const Candidate* c = span.first; c != span.last; ++c) ++start_[cell_of(*c) + 1];
-    for (std::size_t i = 1; i < start_.size(); ++i) start_[i] += start_[i - 1];
-    std::vector<std::int32_t> next(start_.begin(), start_.end() - 1);
-    std::vector<Candidate> sorted(static_cast<std::size_t>(start_.back()));
-    for (const Span& span : spans)
-        for (const Candidate* c = span.first; c != span.last; ++c) sorted[static_cast<std::size_t>(next[cell_of(*c)]++)] = *c;
-    return sorted;
-}
-
 template <class T>
-void pool(std::vector<Candidate>& candidates, Cells& cells, const RangeImage<T>& image, const Parameters& parameters,
-          Team& team) {
+void pool(std::vector<Candidate>& candidates, const RangeImage<T>& image, const Parameters& parameters, Team& team) {
     const auto least = static_cast<float>(parameters.min_significance);
     const bool aligned = parameters.max_shift > 0;
     if (!(least > 0 || aligned || parameters.normals)) return;
     const auto weak = [&](const Candidate& c) { return c.significance < least; };
     {
-        Grid grid(candidates, cells, fields_of_lines);
-        for (std::size_t k = 0; k < candidates.size(); ++k) {
-            const float s = std::min(candidates[k].significance, capped);
+        Grid grid(candidates, image.rows, image.cols, fields_of_lines);
+        grid.for_each([&](std::size_t i, std::size_t k) {
+            const float s = std::min(candidates[i].significance, capped);
             grid.field(evidence_field)[k] = s * s;
-        }
-        grid.for_each_near(team, [&](std::size_t k, const Grid::Near& near) {
-            Candidate& c = candidates[k];
+        });
+        grid.for_each_near(team, [&](std::size_t i, const Grid::Near& near) {
+            Candidate& c = candidates[i];
             c.significance = std::max(std::sqrt(evidence(near)), c.significance * lone);
         });
         if (aligned) {
-            for (std::size_t k = 0; k < candidates.size(); ++k)
-                if (weak(candidates[k])) grid.remove(k);
-            grid.for_each_near(team, [&](std::size_t k, const Grid::Near& near) {
-                if (!weak(candidates[k])) align(candidates[k], near, image, parameters.max_shift);
+            grid.for_each([&](std::size_t i, std::size_t k) {
+                if (weak(candidates[i])) grid.remove(k);
+            });
+            grid.for_each_near(team, [&](std::size_t i, const Grid::Near& near) {
+                if (!weak(candidates[i])) align(candidates[i], near, image, parameters.max_shift);
             });
         }
     }
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), weak), candidates.end());
-    candidates = cells.sort({{candidates.data(), candidates.data() + candidates.size()}});
     if (!parameters.normals) return;
-    const Grid tangents = tangents_of(candidates, cells);
-    tangents.for_each_near(team, [&](std::size_t k, const Grid::Near& near) {
-        Candidate& c = candidates[k];
+    const Grid tangents = tangents_of(candidates, image.rows, image.cols);
+    tangents.for_each_near(team, [&](std::size_t i, const Grid::Near& near) {
+        Candidate& c = candidates[i];
         const double angle = c.crease > 0 ? normal_angle(near, image.projective) : -1;
         if (angle >= 0) c.crease = static_cast<float>(angle);
     });
 }
 
-template void pool(std::vector<Candidate>&, Cells&, const RangeImage<float>&, const Parameters&, Team&);
-template void pool(std::vector<Candidate>&, Cells&, const RangeImage<double>&, const Parameters&, Team&);
+template void pool(std::vector<Candidate>&, const RangeImage<float>&, const Parameters&, Team&);
+template void pool(std::vector<Candidate>&, const RangeImage<double>&, const Parameters&, Team&);
 
 }  // namespace rangeedge
