@@ -92,8 +92,7 @@ private:
         const double cross = tf.s * tg.r - tf.r * tg.s, dot = tf.s * tg.s + tf.r * tg.r;
 
         double jump = cut.meeting ? 0 : std::abs(line.depth(yf) - line.depth(yg));
-        const double longer = std::max(std::abs(cross), std::abs(dot));  // lest they leave the range of single precision
-        double crease = std::abs(std::atan2(static_cast<float>(cross / longer), static_cast<float>(dot / longer))) * degrees;
+        double crease = degrees_of(cross, dot);
         const double sigma = (line.sigma_at(cut.before) + line.sigma_at(cut.after)) / 2;
         const double turn_f = line.turn(tf, zf), turn_g = line.turn(tg, zg);
         const double vf = f.slope_variance(xf), vg = g.slope_variance(xg);

@@ -1,6 +1,7 @@
 // Edge candidates of a range image from its scan lines, and their combination (paper, sections 4.1 and 4.2).
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -43,6 +44,12 @@ enum Kind : std::uint8_t {
     occluded_bit = 16,
     boundary_bit = 32,  // of a pixel
 };
+
+// The angle in degrees whose sine and cosine are as `cross` and `dot`.
+inline double degrees_of(double cross, double dot) {
+    const double longer = std::max(std::abs(cross), std::abs(dot));  // lest they leave the range of single precision
+    return std::abs(std::atan2(static_cast<float>(cross / longer), static_cast<float>(dot / longer))) * 57.295779513082320877;
+}
 
 constexpr float endless = 1e30f;  // at most so large are variances and significances
 

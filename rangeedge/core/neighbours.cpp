@@ -11,18 +11,18 @@
 namespace rangeedge {
 namespace {
 
-constexpr double degrees = 57.295779513082320877;
 constexpr float reach = Cells::size;   // pixels; weights fall from 1 at the candidate itself to 0 there
 constexpr float capped = 8;            // a single candidate's share of the evidence
 constexpr float lone = 1 / 3.0f;       // what a candidate without neighbours is worth
 constexpr float precise = 1e30f;       // at most so much does a slope count
 constexpr int kinds = jump_bit | convex_bit | concave_bit;
+constexpr int direction_shift = 8;     // of the bit of a direction, beside the kinds
 constexpr int lanes = 16;
 
 // What neighbours are asked for; one array each.
 enum Field { x_field, y_field, evidence_field, fields_of_lines };
 enum TangentField {
-    along_x = y_field + 1, along_y, step_x, step_y, place_x, place_y,
+    along_x = y_field + 1, along_y, place_x, place_y,
     precision, slope = precision + 2, value = slope + 2,  // of either side
     fields_of_tangents = value + 2
 };
@@ -36,7 +36,7 @@ public:
         cells_.count(candidates);
         cells_.place(candidates, [&](const Candidate& c, std::size_t k) {
             order_[k] = static_cast<std::int32_t>(&c - candidates.data());
-            kinds_[k] = c.kind & kinds;
+            kinds_[k] = (c.kind & kinds) | c.direction << direction_shift;
             field(x_field)[k] = c.x;
             field(y_field)[k] = c.y;
         });
@@ -87,7 +87,7 @@ private:
         for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
             near.x = field(x_field)[k];
             near.y = field(y_field)[k];
-            near.kinds = kinds_[k];
+            near.kinds = kinds_[k] & kinds;
             visit(static_cast<std::size_t>(order_[k]), near);
         }
     }
@@ -193,10 +193,13 @@ struct TangentSums {
 };
 
 template <int bytes>
-RANGEEDGE_INLINE TangentSums tangent_sums_in(const Grid::Near& near, float across_x, float across_y) {
+RANGEEDGE_INLINE TangentSums tangent_sums_in(const Grid::Near& near, int forward_directions) {
     using F = Floats<bytes>;
+    using I = Ints<bytes>;
     const auto load = [&near](int field, int k) RANGEEDGE_ALWAYS { return F::load(near.grid->field(field) + k); };
-    const F ax = F::all(across_x), ay = F::all(across_y), zero = F::all(0);
+    const F zero = F::all(0);
+    const I forward_bits = I::all(forward_directions << direction_shift), none = I::all(0);
+    const int* bits_of_all = near.grid->kinds_of_all();
     F weight = zero, u = zero, v = zero;
     F xx[2] = {zero, zero}, xy[2] = {zero, zero}, yy[2] = {zero, zero};
     F xm[2] = {zero, zero}, ym[2] = {zero, zero}, values[2] = {zero, zero};
@@ -204,7 +207,7 @@ RANGEEDGE_INLINE TangentSums tangent_sums_in(const Grid::Near& near, float acros
         const F x = load(along_x, k), y = load(along_y, k);
         weight += w, u += w * load(place_x, k), v += w * load(place_y, k);
         // A neighbour whose line crosses the edge the other way has the sides exchanged.
-        const auto forward = negative(bits(zero - (load(step_x, k) * ax + load(step_y, k) * ay)));
+        const I forward = negative(none - (I::load(bits_of_all + k) & forward_bits));
         for (int i = 0; i < 2; ++i) {
             const auto on_side = [&](int field) RANGEEDGE_ALWAYS {
                 return select(forward, load(field + i, k), load(field + 1 - i, k));
@@ -222,14 +225,14 @@ RANGEEDGE_INLINE TangentSums tangent_sums_in(const Grid::Near& near, float acros
     sums.place[0] = u.sum(), sums.place[1] = v.sum();
     return sums;
 }
-RANGEEDGE_VERSIONS(TangentSums, tangent_sums, (const Grid::Near& near, float across_x, float across_y), (near, across_x, across_y))
+RANGEEDGE_VERSIONS(TangentSums, tangent_sums, (const Grid::Near& near, int forward_directions), (near, forward_directions))
 
-// One step of a candidate's scan line.
+// One step along a scan line.
 struct Step {
     int dcol, drow;
 };
-Step step_of(const Candidate& c) {
-    return {c.direction == cols_bit ? 0 : 1, c.direction == rows_bit ? 0 : c.direction == diag45_bit ? -1 : 1};
+Step step_of(int direction) {
+    return {direction == cols_bit ? 0 : 1, direction == rows_bit ? 0 : direction == diag45_bit ? -1 : 1};
 }
 
 // Moves a crease along its scan line onto the line it has in common with its neighbours, unless that leads off the data.
@@ -237,7 +240,7 @@ template <class T>
 void align(Candidate& c, const Grid::Near& near, const RangeImage<T>& image, double max_shift) {
     if ((c.kind & jump_bit) || !(c.crease > 0)) return;
     const CommonLine line = common_line(near);
-    const Step step = step_of(c);
+    const Step step = step_of(c.direction);
     const double along = step.dcol * line.across[0] + step.drow * line.across[1];
     if (!line.found || std::abs(along) < 0.3) return;
     const double shift = line.offset / along, total = static_cast<double>(c.shift) + shift;
@@ -257,14 +260,19 @@ void align(Candidate& c, const Grid::Near& near, const RangeImage<T>& image, dou
 double normal_angle(const Grid::Near& near, bool projective) {
     const CommonLine line = common_line(near);
     if (!line.found) return -1;
-    const TangentSums sums = tangent_sums(near, static_cast<float>(line.across[0]), static_cast<float>(line.across[1]));
+    int forward = 0;  // the directions whose lines cross the edge as the candidate's normal does
+    for (const int direction : {rows_bit, cols_bit, diag45_bit, diag135_bit}) {
+        const Step step = step_of(direction);
+        if (step.dcol * line.across[0] + step.drow * line.across[1] > 0) forward |= direction;
+    }
+    const TangentSums sums = tangent_sums(near, forward);
     const double place[2] = {sums.place[0] / sums.weight, sums.place[1] / sums.weight};
     double a[3], b[3];
     for (int i = 0; i < 2; ++i)
         if (!sums.sides[i].normal(projective, place, sums.weight, i ? b : a)) return -1;
     const double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2], z = a[0] * b[1] - a[1] * b[0];
     const double dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    return std::atan2(std::sqrt(x * x + y * y + z * z), dot) * degrees;
+    return degrees_of(std::sqrt(x * x + y * y + z * z), dot);
 }
 
 // The grid of candidates with what `normal_angle` asks of them.
@@ -272,9 +280,7 @@ Grid tangents_of(const std::vector<Candidate>& candidates, int rows, int cols) {
     Grid grid(candidates, rows, cols, fields_of_tangents);
     grid.for_each([&](std::size_t i, std::size_t k) {
         const Candidate& c = candidates[i];
-        const Step step = step_of(c);
         grid.field(along_x)[k] = c.along[0], grid.field(along_y)[k] = c.along[1];
-        grid.field(step_x)[k] = static_cast<float>(step.dcol), grid.field(step_y)[k] = static_cast<float>(step.drow);
         grid.field(place_x)[k] = c.place[0], grid.field(place_y)[k] = c.place[1];
         for (int side = 0; side < 2; ++side) {
             const Side& s = c.sides[side];
