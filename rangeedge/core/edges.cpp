@@ -128,8 +128,8 @@ private:
     }
 
     static Side side(const Line<T>& line, double value, double slope, double variance) {
-        return {static_cast<float>(value), static_cast<float>(slope / line.step),
-                std::min(static_cast<float>(variance / (line.step * line.step)), endless)};
+        return {static_cast<float>(value), static_cast<float>(slope * line.per_step),
+                std::min(static_cast<float>(variance * line.per_step * line.per_step), endless)};
     }
 
     int cols_;

@@ -47,8 +47,8 @@ enum Kind : std::uint8_t {
 
 // The angle in degrees whose sine and cosine are as `cross` and `dot`.
 inline double degrees_of(double cross, double dot) {
-    const double longer = std::max(std::abs(cross), std::abs(dot));  // lest they leave the range of single precision
-    return std::abs(std::atan2(static_cast<float>(cross / longer), static_cast<float>(dot / longer))) * 57.295779513082320877;
+    const double scale = 1 / std::max(std::abs(cross), std::abs(dot));  // lest they leave the range of single precision
+    return std::abs(std::atan2(static_cast<float>(cross * scale), static_cast<float>(dot * scale))) * 57.295779513082320877;
 }
 
 constexpr float endless = 1e30f;  // at most so large are variances and significances

@@ -165,7 +165,8 @@ void LineReader<T>::place(Line<T>& line) const {
     const double du = p[0] * path.dcol + p[1] * path.drow, dv = p[3] * path.dcol + p[4] * path.drow;
     const double u = p[0] * path.col + p[1] * path.row + p[2], v = p[3] * path.col + p[4] * path.row + p[5];
     line.step = std::hypot(du, dv);
-    line.along[0] = du / line.step, line.along[1] = dv / line.step;
+    line.per_step = 1 / line.step;
+    line.along[0] = du * line.per_step, line.along[1] = dv * line.per_step;
     line.start = u * line.along[0] + v * line.along[1];
     line.across = v * line.along[0] - u * line.along[1];
     line.kappa = std::sqrt(1 + line.across * line.across);

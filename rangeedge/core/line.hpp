@@ -47,7 +47,7 @@ struct Line {
     const T* x = nullptr;      // null where samples are one unit apart
     const T* scale = nullptr;  // inverse tolerances, where they differ
     bool projective = false;
-    double start = 0, step = 1;
+    double start = 0, step = 1, per_step = 1;
     double kappa = 1;  // in the plane, a point of inverse depth q lies at (w / q, kappa / q)
     double along[2] = {1, 0}, across = 0;  // the line in the plane of the image: direction, and distance from the origin
     double tolerance = 1;
@@ -64,13 +64,13 @@ struct Line {
         double s, r;
     };
     Tangent tangent(double abscissa, double value, double slope) const {
-        const double m = slope / step;
+        const double m = slope * per_step;
         if (!projective) return {1, -m};
         return {value - (start + step * abscissa) * m, -kappa * m};
     }
     // How fast the tangent turns with the slope.
     double turn(const Tangent& t, double value) const {
-        return (projective ? kappa * value : 1) / (step * (t.s * t.s + t.r * t.r));
+        return (projective ? kappa * value : 1) * per_step / (t.s * t.s + t.r * t.r);
     }
 };
 

@@ -18,19 +18,24 @@ RANGEEDGE_INLINE Ints<bytes> validity(const float* y) {
     return Ints<bytes>::all(0x7f800000) - bits(magnitude(Floats<bytes>::load(y)));
 }
 
-// The first sample that is valid or is not: blocks without one are passed over, then lanes, then samples.
+// The first sample that is valid or is not: blocks without one are passed over, then lanes; in these it is sought
+// without branches.
 template <int bytes, bool valid>
 RANGEEDGE_INLINE int find_in(const float* y, int k, int n) {
-    constexpr int lanes = Ints<bytes>::count;
+    using I = Ints<bytes>;
     const auto join = [](auto a, auto b) RANGEEDGE_ALWAYS { return valid ? a & b : a | b; };
-    for (; k + 4 * lanes <= n; k += 4 * lanes) {
-        const auto block = join(join(validity<bytes>(y + k), validity<bytes>(y + k + lanes)),
-                                join(validity<bytes>(y + k + 2 * lanes), validity<bytes>(y + k + 3 * lanes)));
+    for (; k + 4 * I::count <= n; k += 4 * I::count) {
+        const I block = join(join(validity<bytes>(y + k), validity<bytes>(y + k + I::count)),
+                             join(validity<bytes>(y + k + 2 * I::count), validity<bytes>(y + k + 3 * I::count)));
         if ((block.joined(join) >= 0) == valid) break;
     }
-    while (k + lanes <= n && (validity<bytes>(y + k).joined(join) >= 0) != valid) k += lanes;
-    while (k < n && (y[k] == y[k]) != valid) ++k;
-    return k;
+    for (; k < n; k += I::count) {
+        const I invalid = negative(validity<bytes>(y + k)), beyond = I::all(n);
+        const I at = valid ? I::from(k) ^ ((I::from(k) ^ beyond) & invalid) : beyond ^ ((I::from(k) ^ beyond) & invalid);
+        const int first = at.joined([](auto a, auto b) RANGEEDGE_ALWAYS { return a < b ? a : b; });
+        if (first < n) return first;
+    }
+    return n;
 }
 template <int bytes>
 RANGEEDGE_INLINE int first_valid_in(const float* y, int k, int n) {
@@ -66,21 +71,23 @@ struct ThreePoint {
     }
 };
 
+// Where the largest residual is, if it exceeds the line's eps; else -1.
 template <class T>
-typename Splitter<T>::Worst worst_of(const Samples<T>& line, const Segment& s) {
+int worst_of(const Samples<T>& line, const Segment& s) {
     const ThreePoint<T> curve(line, s);
-    typename Splitter<T>::Worst worst{-1, s.first + 1};
+    T most = line.eps;
+    int at = -1;
     for (int k = s.first + 1; k < s.last; ++k) {
         T r = curve.residual(line.x ? line.x[k] : static_cast<T>(k), line.y[k]);
         if (line.scale) r *= line.scale[k];
-        if (r > worst.residual) worst = {r, k};
+        if (r > most) most = r, at = k;
     }
-    return worst;
+    return at;
 }
 
 // The same for samples one unit apart, sixteen at a time: each lane keeps its own worst.
 template <int bytes>
-RANGEEDGE_INLINE Splitter<float>::Worst worst_in_lanes(const Samples<float>& line, const Segment& s) {
+RANGEEDGE_INLINE int worst_in_lanes(const Samples<float>& line, const Segment& s) {
     using F = Floats<bytes>;
     using I = Ints<bytes>;
     const ThreePoint<float> curve(line, s);
@@ -102,24 +109,28 @@ RANGEEDGE_INLINE Splitter<float>::Worst worst_in_lanes(const Samples<float>& lin
     int k = s.first + 1;
     for (; k + F::count <= s.last; k += F::count) look(k, F::count);
     if (k < s.last) look(k, s.last - k);
-    // Across the lanes, without branches: which is the worst cannot be foretold.
     const float most = worst.joined([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; });
+    if (!(most > line.eps)) return -1;
+    // Across the lanes, without branches: which is the worst cannot be foretold.
     const F all_most = F::all(most);
     const I beyond = I::all(s.last);
     for (int p = 0; p < F::parts; ++p) at.part[p] = worst.part[p] == all_most.part[p] ? at.part[p] : beyond.part[p];
-    return {most, at.joined([](auto p, auto q) RANGEEDGE_ALWAYS { return p < q ? p : q; })};
+    return at.joined([](auto p, auto q) RANGEEDGE_ALWAYS { return p < q ? p : q; });
 }
 
-// Of `count` pending nodes. Lines without abscissae.
+// Of `count` pending nodes, those to be cut; returns how many. Lines without abscissae.
 template <int bytes>
-RANGEEDGE_INLINE void find_worst_in(const Samples<float>* lines, const Splitter<float>::Node* nodes, const int* pending,
-                                    std::size_t count, Splitter<float>::Worst* worst) {
+RANGEEDGE_INLINE std::size_t find_worst_in(const Samples<float>* lines, const Splitter<float>::Node* nodes,
+                                           const int* pending, std::size_t count, Splitter<float>::Worst* worst) {
+    std::size_t found = 0;
     for (std::size_t i = 0; i < count; ++i) {
         const Splitter<float>::Node& node = nodes[pending[i]];
-        worst[i] = worst_in_lanes<bytes>(lines[node.line], node.segment);
+        const int at = worst_in_lanes<bytes>(lines[node.line], node.segment);
+        if (at >= 0) worst[found++] = {pending[i], at};
     }
+    return found;
 }
-RANGEEDGE_VERSIONS(void, find_worst,
+RANGEEDGE_VERSIONS(std::size_t, find_worst,
                    (const Samples<float>* lines, const Splitter<float>::Node* nodes, const int* pending,
                     std::size_t count, Splitter<float>::Worst* worst),
                    (lines, nodes, pending, count, worst))
@@ -151,37 +162,44 @@ void Splitter<T>::add(const Samples<T>& line) {
 }
 
 template <class T>
+void Splitter<T>::find_worst_of_pending() {
+    worst_.resize(pending_.size());
+    if constexpr (std::is_same_v<T, float>) {
+        if (!lines_.front().x) {
+            worst_.resize(find_worst(lines_.data(), nodes_.data(), pending_.data(), pending_.size(), worst_.data()));
+            return;
+        }
+    }
+    std::size_t found = 0;
+    for (const int i : pending_) {
+        const Node& node = nodes_[static_cast<std::size_t>(i)];
+        const int at = worst_of(lines_[static_cast<std::size_t>(node.line)], node.segment);
+        if (at >= 0) worst_[found++] = {i, at};
+    }
+    worst_.resize(found);
+}
+
+template <class T>
 void Splitter<T>::split() {
     for (; !pending_.empty(); pending_.swap(following_)) {
-        worst_.resize(pending_.size());
-        if constexpr (std::is_same_v<T, float>) {
-            if (!lines_.front().x) find_worst(lines_.data(), nodes_.data(), pending_.data(), pending_.size(), worst_.data());
-        }
-        if (!std::is_same_v<T, float> || lines_.front().x)
-            for (std::size_t i = 0; i < pending_.size(); ++i) {
-                const Node& node = nodes_[static_cast<std::size_t>(pending_[i])];
-                worst_[i] = worst_of(lines_[static_cast<std::size_t>(node.line)], node.segment);
-            }
+        find_worst_of_pending();
         std::size_t count = nodes_.size(), follow = 0;
-        nodes_.resize(count + pending_.size());
-        following_.resize(2 * pending_.size());
-        for (std::size_t i = 0; i < pending_.size(); ++i) {
-            Node& node = nodes_[static_cast<std::size_t>(pending_[i])];
-            const Samples<T>& line = lines_[static_cast<std::size_t>(node.line)];
-            if (!(worst_[i].residual > line.eps)) continue;
+        nodes_.resize(count + worst_.size());
+        following_.resize(2 * worst_.size());
+        for (const Worst& worst : worst_) {
+            Node& node = nodes_[static_cast<std::size_t>(worst.node)];
+            const T* y = lines_[static_cast<std::size_t>(node.line)].y + worst.at;
             // The cut falls between two samples; the extreme one joins the neighbour it is closer to.
-            const int k = worst_[i].at;
-            const bool joins_left = std::abs(line.y[k] - line.y[k - 1]) <= std::abs(line.y[k + 1] - line.y[k]);
-            const int cut = joins_left ? k : k - 1, right = static_cast<int>(count);
+            const bool joins_left = std::abs(y[0] - y[-1]) <= std::abs(y[1] - y[0]);
+            const int cut = joins_left ? worst.at : worst.at - 1, right = static_cast<int>(count);
             nodes_[count++] = {{cut + 1, node.segment.last}, node.line, node.next};
-            following_[follow] = pending_[i];
+            following_[follow] = worst.node;
             follow += static_cast<std::size_t>(cut - node.segment.first >= exact);
             following_[follow] = right;
             follow += static_cast<std::size_t>(node.segment.last - cut > exact);
             node.segment.last = cut;
             node.next = right;
         }
-        nodes_.resize(count);
         following_.resize(follow);
     }
 }

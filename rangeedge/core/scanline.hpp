@@ -70,18 +70,19 @@ public:
         Segment segment;
         int line, next;
     };
-    // Where the residual is largest, and how large; the first of equals.
+    // A node to be cut, and where its residual is largest: the first of equals.
     struct Worst {
-        T residual;
-        int at;
+        int node, at;
     };
 
 private:
+    void find_worst_of_pending();
+
     std::vector<Samples<T>> lines_;
     std::vector<Node> nodes_;
     std::vector<int> heads_;               // nodes
     std::vector<int> pending_, following_;  // nodes of this generation, and of the next one
-    std::vector<Worst> worst_;             // of those pending
+    std::vector<Worst> worst_;             // of those pending that are not approximated
 };
 
 }  // namespace rangeedge

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstddef>
-#include <cstdlib>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -29,24 +28,28 @@ Place place_of(float distance, Index pixel) {
 
 // By rising `fall`; equal ones stay in order.
 void sort(std::vector<Place>& places) {
-    constexpr int bits = 11, passes = 3;
+    constexpr int bits = 13, most_passes = 3;
     constexpr std::uint32_t digits = 1u << bits;
-    const auto digit = [](const Place& place, int pass) { return (place.fall >> (pass * bits)) & (digits - 1); };
-    std::vector<std::array<std::size_t, digits>> start(passes);
+    std::uint32_t least = ~0u, most = 0;
+    for (const Place& place : places) least = std::min(least, place.fall), most = std::max(most, place.fall);
+    int passes = 0;
+    while (passes < most_passes && !places.empty() && (most - least) >> (passes * bits)) ++passes;
+    const auto digit = [=](const Place& place, int pass) { return ((place.fall - least) >> (pass * bits)) & (digits - 1); };
+    std::vector<std::array<std::uint32_t, digits>> start(most_passes);
     for (const Place& place : places)
         for (int pass = 0; pass < passes; ++pass) ++start[static_cast<std::size_t>(pass)][digit(place, pass)];
     std::vector<Place> other(places.size());
     for (int pass = 0; pass < passes; ++pass) {
         auto& next = start[static_cast<std::size_t>(pass)];
-        std::size_t sum = 0;
-        for (std::size_t& n : next) sum += std::exchange(n, sum);
+        std::uint32_t sum = 0;
+        for (std::uint32_t& n : next) sum += std::exchange(n, sum);
         for (const Place& place : places) other[next[digit(place, pass)]++] = place;
         places.swap(other);
     }
 }
 
 // Of which of the eight neighbours one of each connected group is the first, by which of them there are.
-std::array<std::uint8_t, 256> first_of_groups() {
+constexpr std::array<std::uint8_t, 256> first_of_groups() {
     constexpr int x[8] = {-1, 0, 1, -1, 1, -1, 0, 1}, y[8] = {-1, -1, -1, 0, 0, 1, 1, 1};
     std::array<std::uint8_t, 256> first{};
     for (unsigned there = 0; there < 256; ++there)
@@ -57,8 +60,8 @@ std::array<std::uint8_t, 256> first_of_groups() {
                 before = group;
                 for (int i = 0; i < 8; ++i)
                     for (int j = 0; j < 8; ++j)
-                        if ((before >> i & 1) && (rest >> j & 1) && std::abs(x[i] - x[j]) <= 1 &&
-                            std::abs(y[i] - y[j]) <= 1)
+                        if ((before >> i & 1) && (rest >> j & 1) && (x[i] - x[j]) * (x[i] - x[j]) <= 1 &&
+                            (y[i] - y[j]) * (y[i] - y[j]) <= 1)
                             group |= 1u << j;
             }
             rest &= ~group;
@@ -105,7 +108,7 @@ std::size_t Islands::join(std::size_t low, std::size_t high, float level) {
 }
 
 std::vector<Index> Islands::peaks(const std::vector<Place>& order, const std::array<Index, 8>& neighbours) {
-    const std::array<std::uint8_t, 256> first = first_of_groups();
+    static constexpr std::array<std::uint8_t, 256> first = first_of_groups();
     const std::array<Index, 8> steps = neighbours;
     std::vector<std::uint8_t> above(distance_.size(), 0);  // which neighbours are
     std::vector<std::uint32_t> number(distance_.size());   // of a pixel's island
