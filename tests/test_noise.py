@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge import CREASE_MAX, NoiseModel, edgePoints, edgeStrength, estimateNoise
+from rangeedge import CREASE_MAX, NoiseModel, _core, edgePoints, edgeStrength, estimateNoise
 from rangeedge.synthetic import demoScene, gaussianNoise, pinholeCamera, renderScene
 
 NAN = np.nan
@@ -110,6 +110,73 @@ def test_tiny_and_empty_images_have_some_noise(shape, kwargs):
         assert np.isfinite(estimate(1.0))
         assert estimate(1.0) > 0
         edgeStrength(src, **kwargs)
+
+
+# The kernel against the same statistics by sorting.
+
+LAG, WINDOWS, BINS, BIN_SIZE = 6, 1 << 15, 8, 50
+
+
+def third_differences(ordinate, lag):
+    """|y0 - 3 y1 + 3 y2 - y3| along rows and columns, and the means of the four; of a large image some lines."""
+    sizes, means = [np.empty(0)], [np.empty(0)]
+    for y in (ordinate, ordinate.T):
+        if len(y) > 3 * lag:
+            y = y[:, :: 1 + y.size // WINDOWS].astype(np.float64)
+            y0, y1, y2, y3 = (y[k * lag : len(y) - (3 - k) * lag] for k in range(4))
+            d = np.abs(y3 - y0 - 3 * (y2 - y1))
+            sizes.append(d[np.isfinite(d)])
+            means.append(((y0 + y1 + y2 + y3) / 4)[np.isfinite(d)])
+    return np.concatenate(sizes), np.concatenate(means)
+
+
+def trimmed_deviation(differences):
+    kept = int(0.75 * len(differences))
+    if kept == 0:
+        return 0.0
+    ordered = np.sort(differences)
+    sigma = np.sqrt(np.mean(ordered[:kept] ** 2) / 20) / 0.607
+    moved = ordered[ordered > 0]
+    if len(moved) == 0 or len(moved) < 0.05 * len(differences):
+        return sigma
+    return max(sigma, moved[int(0.05 * len(moved))] / np.sqrt(12))
+
+
+def by_ordinate(differences, ordinates):
+    """The median ordinate and the deviation of bins with as many differences each; ordinates in single precision."""
+    ordinates = ordinates.astype(np.float32).astype(np.float64)
+    count = max(1, min(BINS, len(ordinates) // BIN_SIZE))
+    order = np.argsort(ordinates)
+    differences, ordinates = differences[order], ordinates[order]
+    borders = np.quantile(ordinates, np.arange(1, count) / count).astype(np.float32)
+    bins = np.searchsorted(borders, ordinates, side="left")
+    parts = [bins == b for b in range(count) if (bins == b).any()]
+    return [np.median(ordinates[p]) for p in parts], [trimmed_deviation(differences[p]) for p in parts]
+
+
+def images():
+    rng = np.random.default_rng(21)
+    slope = np.arange(300) * 0.01 + np.arange(220)[:, None] * 0.003
+    yield slope + 0.01 * rng.standard_normal(slope.shape)
+    yield np.round(slope / 0.05) * 0.05  # mostly zero differences
+    yield np.where(rng.random(slope.shape) < 0.2, NAN, slope + 0.002 * rng.standard_normal(slope.shape))
+    yield rng.standard_normal((40, 7))
+    yield rng.standard_normal((3, 25)) - 5
+    yield np.full((30, 30), 2.0)
+    yield rng.standard_normal((700, 500)).cumsum(axis=1)  # large: not every line
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_statistics_are_those_of_sorted_differences(dtype, threads):
+    for y in images():
+        y = y.astype(dtype)
+        near, far, lowest, highest, ordinates, deviations = _core.noise_statistics(y, threads)
+        differences, means = third_differences(y, 1)
+        np.testing.assert_allclose(near, trimmed_deviation(differences), rtol=1e-6)
+        np.testing.assert_allclose(far, trimmed_deviation(third_differences(y, LAG)[0]), rtol=1e-6)
+        np.testing.assert_allclose([lowest, highest], [means.min(), means.max()], rtol=1e-6)
+        np.testing.assert_allclose([ordinates, deviations], by_ordinate(differences, means), rtol=1e-6, atol=1e-12)
 
 
 # Models.
