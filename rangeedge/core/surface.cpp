@@ -5,8 +5,6 @@
 #include <cmath>
 #include <cstddef>
 
-#include "simd.hpp"
-
 namespace rangeedge {
 namespace {
 
@@ -19,17 +17,6 @@ constexpr std::size_t place(int i, int j) { return static_cast<std::size_t>((i +
 constexpr double dependent = 1e-9;
 
 }  // namespace
-
-RANGEEDGE_WIDE void SurfaceSums::add(const Sample& s) {
-    const double u = s.x - x0_, v = s.y - y0_, f = s.ordinate - base_, w = s.weight;
-    const double uu = u * u, uv = u * v, vv = v * v;
-    const std::array<double, 15> term{1,      u,       v,       uu,      uv,      vv,      u * uu, u * uv,
-                                      u * vv, v * vv, uu * uu, uu * uv, uu * vv, uv * vv, vv * vv};
-    for (std::size_t k = 0; k < term.size(); ++k) power_[k] += w * term[k];
-    for (std::size_t k = 0; k < product_.size(); ++k) product_[k] += w * f * term[k];
-    square_ += w * f * f;
-    ++count_;
-}
 
 SurfaceSums SurfaceSums::moved(double x0, double y0, double base) const {
     static constexpr int choose[5][5] = {{1}, {1, 1}, {1, 2, 1}, {1, 3, 3, 1}, {1, 4, 6, 4, 1}};

@@ -34,7 +34,19 @@ public:
     SurfaceSums() = default;
     SurfaceSums(double x0, double y0, double base) : x0_(x0), y0_(y0), base_(base) {}
 
-    void add(const Sample& s);
+    void add(const Sample& s) {
+        const double u = s.x - x0_, v = s.y - y0_, f = s.ordinate - base_, w = s.weight, wf = w * f;
+        const double uu = u * u, uv = u * v, vv = v * v;
+        // Term by term: an array of them would be written in parts and read as a whole, for which a processor waits.
+        power_[0] += w, power_[1] += w * u, power_[2] += w * v, power_[3] += w * uu, power_[4] += w * uv;
+        power_[5] += w * vv, power_[6] += w * (u * uu), power_[7] += w * (u * uv), power_[8] += w * (u * vv);
+        power_[9] += w * (v * vv), power_[10] += w * (uu * uu), power_[11] += w * (uu * uv);
+        power_[12] += w * (uu * vv), power_[13] += w * (uv * vv), power_[14] += w * (vv * vv);
+        product_[0] += wf, product_[1] += wf * u, product_[2] += wf * v;
+        product_[3] += wf * uu, product_[4] += wf * uv, product_[5] += wf * vv;
+        square_ += wf * f;
+        ++count_;
+    }
     // Only what a plane takes.
     void add_to_plane(const Sample& s) {
         const double u = s.x - x0_, v = s.y - y0_, f = s.ordinate - base_, w = s.weight;
