@@ -182,9 +182,11 @@ private:
         const Segment s = segment(i);
         const Line<T>& line = line_of(i);
         Curve &f = curves[static_cast<std::size_t>(before)], &g = curves[static_cast<std::size_t>(after)];
+        const double begin = line.abscissa(s.first - 1), end = line.abscissa(s.last + 1);
+        const double near = (line.abscissa(s.first) + line.abscissa(s.last)) / 2;
         double x = 0;
-        if (!intersection(f, g, (line.abscissa(s.first) + line.abscissa(s.last)) / 2, x)) return false;
-        if (x < line.abscissa(s.first - 1) || x > line.abscissa(s.last + 1)) return false;
+        if (!intersection(f, g, near, std::max(near - begin, end - near), x)) return false;
+        if (x < begin || x > end) return false;
         int cut = s.first - 1;
         while (cut < s.last && line.abscissa(cut + 1) <= x) ++cut;
         auto left = pieces_.sums(before), right = pieces_.sums(after);
@@ -323,9 +325,10 @@ Curve UnevenPieces::curve(int i) const {
     return fit_least_squares(sums(i), least[static_cast<std::size_t>(i)]);
 }
 
-bool intersection(const Curve& f, const Curve& g, double near, double& x) {
+bool intersection(const Curve& f, const Curve& g, double near, double reach, double& x) {
     // f - g = c + b t + a t^2 with t = x - near; the root of smaller magnitude, without cancellation.
     const double c = f.value(near) - g.value(near), b = f.slope(near) - g.slope(near), a = f.c2 - g.c2;
+    if (std::abs(c) > (std::abs(b) + std::abs(a) * reach) * reach) return false;
     const double discriminant = b * b - 4 * a * c;
     if (!(discriminant >= 0)) return false;
     const double denominator = std::abs(b) + std::sqrt(discriminant);

@@ -102,7 +102,7 @@ private:
     std::vector<int> cuts_, chosen_;
 };
 
-// Where f and g meet, the place nearest `near`; false where they do not.
-bool intersection(const Curve& f, const Curve& g, double near, double& x);
+// Where f and g meet, the place nearest `near`; false where they do not within `reach`, or farther away.
+bool intersection(const Curve& f, const Curve& g, double near, double reach, double& x);
 
 }  // namespace rangeedge

@@ -60,8 +60,9 @@ private:
             const double shift = sample - cut.sample;
             return std::abs(shift) > parameters_.max_shift ? cut : Cut{before, after, x, sample, shift, true};
         };
+        const double reach = line.x ? HUGE_VAL : parameters_.max_shift + 1;
         double x = 0;
-        if (!(parameters_.max_shift > 0) || !intersection(a.curves[i], a.curves[i + 1], cut.abscissa, x)) return cut;
+        if (!(parameters_.max_shift > 0) || !intersection(a.curves[i], a.curves[i + 1], cut.abscissa, reach, x)) return cut;
         if (x >= xa && x <= xb)
             return meeting(left.last, right.first, x, left.last + (right.first - left.last) * (x - xa) / (xb - xa));
         const bool leftward = x < xa;
@@ -153,7 +154,8 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
         for (int first = 0; first < lines; first += strip_lines)
             parts.push_back({direction, first, std::min(strip_lines, lines - first), {}});
     }
-    Team team(parameters.threads);
+    constexpr int parts_per_thread = 8;  // for fewer another thread is not worth starting
+    Team team(std::min(parameters.threads, 1 + static_cast<int>(parts.size()) / parts_per_thread));
     std::atomic<std::size_t> taken{0};
     team.run([&](int) {
         Strip<T> strip;
