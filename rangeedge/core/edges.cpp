@@ -14,7 +14,6 @@
 namespace rangeedge {
 namespace {
 
-constexpr double degrees = 57.295779513082320877;
 constexpr double lone_significance = 3;  // of a candidate by itself, before its neighbours are asked
 constexpr double jump_alone = 12;        // significance of a jump
 constexpr double jump_tolerances = 2;    // what tells a jump from the approximation's own error

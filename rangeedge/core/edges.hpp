@@ -45,10 +45,12 @@ enum Kind : std::uint8_t {
     boundary_bit = 32,  // of a pixel
 };
 
+constexpr double degrees = 57.295779513082320877;  // in a radian
+
 // The angle in degrees whose sine and cosine are as `cross` and `dot`.
 inline double degrees_of(double cross, double dot) {
     const double scale = 1 / std::max(std::abs(cross), std::abs(dot));  // lest they leave the range of single precision
-    return std::abs(std::atan2(static_cast<float>(cross * scale), static_cast<float>(dot * scale))) * 57.295779513082320877;
+    return std::abs(std::atan2(static_cast<float>(cross * scale), static_cast<float>(dot * scale))) * degrees;
 }
 
 constexpr float endless = 1e30f;  // at most so large are variances and significances

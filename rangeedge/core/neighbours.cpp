@@ -280,14 +280,17 @@ Grid tangents_of(const std::vector<Candidate>& candidates, int rows, int cols) {
     Grid grid(candidates, rows, cols, fields_of_tangents);
     grid.for_each([&](std::size_t i, std::size_t k) {
         const Candidate& c = candidates[i];
-        grid.field(along_x)[k] = c.along[0], grid.field(along_y)[k] = c.along[1];
-        grid.field(place_x)[k] = c.place[0], grid.field(place_y)[k] = c.place[1];
+        // Zero times infinity would spoil sums in which a candidate has no weight.
+        const auto finite = [](float v) { return std::isfinite(v) ? v : 0.0f; };
+        grid.field(along_x)[k] = finite(c.along[0]), grid.field(along_y)[k] = finite(c.along[1]);
+        grid.field(place_x)[k] = finite(c.place[0]), grid.field(place_y)[k] = finite(c.place[1]);
         for (int side = 0; side < 2; ++side) {
             const Side& s = c.sides[side];
             // A slope that its samples do not fix says nothing.
-            grid.field(precision + side)[k] = s.slope_variance < endless ? std::min(1 / s.slope_variance, precise) : 0;
-            grid.field(slope + side)[k] = s.slope;
-            grid.field(value + side)[k] = s.value;
+            const bool fixed = s.slope_variance < endless && std::isfinite(s.slope);
+            grid.field(precision + side)[k] = fixed ? std::min(1 / s.slope_variance, precise) : 0;
+            grid.field(slope + side)[k] = finite(s.slope);
+            grid.field(value + side)[k] = finite(s.value);
         }
     });
     return grid;
