@@ -67,7 +67,7 @@ double cost_of(double residual, double left, double right, double sigma) {
 RANGEEDGE_WIDE
 void project(std::size_t count, const double* n, const double* base, const double* least, double* h_mean, double* ht_y1,
              double* htt_y2, double* hh_squares, double* residual) {
-#pragma GCC ivdep
+    RANGEEDGE_INDEPENDENT
     for (std::size_t i = 0; i < count; ++i) {
         const Projections p = projections_of(n[i], base[i], {h_mean[i], ht_y1[i], htt_y2[i], hh_squares[i]});
         h_mean[i] = p.mean, ht_y1[i] = p.y1, htt_y2[i] = p.y2, hh_squares[i] = p.squares;
@@ -84,7 +84,7 @@ struct Columns {
 // What it costs to join each one on the left with that on the right.
 RANGEEDGE_WIDE
 void cost_all(std::size_t count, const Columns left, const Columns right, const double* sigma, double* cost) {
-#pragma GCC ivdep
+    RANGEEDGE_INDEPENDENT
     for (std::size_t i = 0; i < count; ++i) {
         const double one = residual_squares(joined(left[i], right[i]), curved_significance * sigma[i]);
         cost[i] = cost_of(one, left.residual[i], right.residual[i], sigma[i]);
@@ -155,10 +155,11 @@ private:
         chosen_.resize(cuts_.size());
         std::size_t count = 0;
         for (const int i : cuts_) {
-            const bool cheapest = (cost(i) < limit_) & (cost(i) < cost(previous(i))) & (cost(i) <= cost(next(i)));
+            const int cheap = cost(i) < limit_, before = cost(i) < cost(previous(i)), after = cost(i) <= cost(next(i));
+            const int cheapest = cheap & before & after;
             chosen_[count] = i;
             count += static_cast<std::size_t>(cheapest & !chosen(i));
-            chosen(i) |= cheapest;
+            chosen(i) |= cheapest != 0;
         }
         chosen_.resize(count);
     }

@@ -17,7 +17,7 @@ RANGEEDGE_INLINE void invert_all(const T* depth, std::size_t size, Real factor, 
     for (std::size_t i = 0; i < size; ++i) {
         const Real length = std::is_integral_v<T> ? static_cast<Real>(depth[i]) / factor : static_cast<Real>(depth[i]);
         const Real q = 1 / length;
-        inverse[i] = (q > 0) & (q <= most) ? q : nan;
+        inverse[i] = ((q > 0) & (q <= most)) ? q : nan;
     }
 }
 

@@ -15,7 +15,7 @@
 #if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
     !defined(__SANITIZE_THREAD__) && !defined(RANGEEDGE_NARROW)
 #define RANGEEDGE_AVX512 "avx512f,avx512bw,avx512dq,avx512vl"
-#define RANGEEDGE_WIDE __attribute__((target_clones("arch=x86-64-v4", "avx2", "default")))
+#define RANGEEDGE_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
 #define RANGEEDGE_VERSIONS(result, name, parameters, arguments)                                               \
     __attribute__((target(RANGEEDGE_AVX512))) result name parameters { return name##_in<64> arguments; } \
     __attribute__((target("avx2"))) result name parameters { return name##_in<32> arguments; }           \
@@ -24,6 +24,13 @@
 #define RANGEEDGE_WIDE
 #define RANGEEDGE_VERSIONS(result, name, parameters, arguments) \
     result name parameters { return name##_in<16> arguments; }
+#endif
+
+// Before a loop whose iterations do not depend on each other.
+#if defined(__clang__)
+#define RANGEEDGE_INDEPENDENT _Pragma("clang loop vectorize(assume_safety)")
+#else
+#define RANGEEDGE_INDEPENDENT _Pragma("GCC ivdep")
 #endif
 
 namespace rangeedge {
