@@ -59,6 +59,10 @@ def array(func: str, name: str, value: Any, expected: str, ndim: Collection[int]
         raise fail(func, name, f"{expected}, not empty", described(value), cv2.Error.StsBadSize)
     if value.dtype.kind not in "buif":
         raise fail(func, name, expected, described(value), cv2.Error.StsUnsupportedFormat)
+    # Kernels count pixels in 32 bits, in an image with a margin of one.
+    if value.ndim > 1 and (value.shape[0] + 2) * (value.shape[1] + 2) >= 2**31:
+        expected = f"{expected} of fewer than 2^31 pixels, a margin of one included"
+        raise fail(func, name, expected, described(value), cv2.Error.StsBadSize)
     return value
 
 

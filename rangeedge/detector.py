@@ -151,7 +151,7 @@ def found_edges(func: str, frame: RangeFrame, params: ScanLineParams, selection:
 
 def selected_of(strength: EdgeStrength, selection: Selection) -> np.ndarray:
     """The edge map before thinning: jumps on their nearer side, and creases that do not stand alone."""
-    jump = cv2.copyTo(strength.jump, cv2.bitwise_and(strength.kind, EDGE_OCCLUDING))
+    jump = cv2.copyTo(strength.jump, strength.kind & np.uint8(EDGE_OCCLUDING))
     crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold)
     return selected(jump, crease, selection)
 
@@ -165,7 +165,7 @@ def _unfrayed(crease: np.ndarray, least: float) -> np.ndarray:
         return crease
     strong = at_least(crease, least).view(np.uint8)
     around = cv2.boxFilter(strong, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
-    return cv2.copyTo(crease, cv2.compare(around, 4, cv2.CMP_GE))
+    return cv2.copyTo(crease, (around >= 4).view(np.uint8))
 
 
 def createScanLineDetector(params: ScanLineParams | None = None) -> ScanLineDetector:

@@ -82,8 +82,6 @@ def range_frame(
         raise fail(func, "pixelSize", "None where K is given", described(pixelSize))
     if K is not None and heightMap:
         raise fail(func, "heightMap", "False where K is given (its values are depths)", heightMap)
-    if src.shape[0] * src.shape[1] >= 1 << 31:
-        raise fail(func, "src", "an image of fewer than 2**31 pixels", described(src), cv2.Error.StsBadSize)
     inside = None if mask is None else image8(func, "mask", mask, src.shape[:2]) != 0
     if src.ndim == 3:
         return _points(func, src, inside, K, pixelSize, heightMap)

@@ -91,6 +91,23 @@ def detector():
 # detectEdges
 
 
+@pytest.mark.parametrize("shape", [(1, 1), (1, 2), (2, 1), (1, 40), (40, 1), (2, 2), (3, 3)])
+@pytest.mark.parametrize("dtype", [np.uint16, np.float32, np.float64])
+def test_tiny_images_have_no_edges(dtype, shape):
+    for camera in (dict(K=np.eye(3)), {}):
+        edges = detectEdges(np.full(shape, 2).astype(dtype), noise=0.01, **camera)
+        assert edges.shape == shape
+        assert not edges.any()
+
+
+@pytest.mark.parametrize("function", [detectEdges, edgeStrength])
+def test_images_too_large_to_count_are_refused(function):
+    for shape in ((46340, 46340), (720_000_000, 1)):
+        huge = np.broadcast_to(np.float32(1), shape)
+        with pytest.raises(rangeedge.error, match=r"`src` must be .* of fewer than 2\^31 pixels"):
+            function(huge)
+
+
 def test_detect_edges_is_strength_selection_thinning(scene):
     strength = edgeStrength(scene, K=K, noise=0.001)
     jump = np.where(strength.kind & EDGE_OCCLUDING, strength.jump, np.float32(0))

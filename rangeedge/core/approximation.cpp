@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <type_traits>
 
 #include "simd.hpp"
 
@@ -60,7 +59,8 @@ inline Projections projections_of(double n, double base, const Sums& s) {
 int middle(const Segment& s) { return s.first + s.size() / 2; }
 
 double cost_of(double residual, double left, double right, double sigma) {
-    return sigma > 0 ? (residual - left - right) / (sigma * sigma) : HUGE_VAL;
+    const double cost = (residual - left - right) / (sigma * sigma);
+    return sigma > 0 && cost == cost ? cost : HUGE_VAL;
 }
 
 // Each of `count` segments gets its projections in place of its sums, and the squares of its residuals.

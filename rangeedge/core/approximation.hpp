@@ -102,7 +102,8 @@ private:
     std::vector<int> cuts_, chosen_;
 };
 
-// Where f and g meet, the place nearest `near`; false where they do not within `reach`, or farther away.
+// Where f and g meet, the place nearest `near`; false where they do not. Places farther than `reach` are not sought, but
+// may be found.
 bool intersection(const Curve& f, const Curve& g, double near, double reach, double& x);
 
 }  // namespace rangeedge

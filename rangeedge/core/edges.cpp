@@ -192,7 +192,7 @@ void combine(const std::vector<Candidate>& candidates, float* jump, float* creas
             const bool nearer = ((c.kind & occluding_bit) != 0) == (p == c.before);
             if (c.kind & jump_bit)
                 kind[p] = static_cast<std::uint8_t>(kind[p] | jump_bit | (nearer ? occluding_bit : occluded_bit));
-            if (c.crease > crease[p] || (c.crease == crease[p] && (c.kind & convex_bit))) {
+            if (c.crease > crease[p] || (c.crease > 0 && c.crease == crease[p] && (c.kind & convex_bit))) {
                 crease[p] = c.crease;
                 const int other = kind[p] & ~(convex_bit | concave_bit);
                 kind[p] = static_cast<std::uint8_t>(other | (c.kind & (convex_bit | concave_bit)));

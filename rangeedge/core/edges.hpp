@@ -47,7 +47,7 @@ enum Kind : std::uint8_t {
 
 constexpr double degrees = 57.295779513082320877;  // in a radian
 
-// The angle in degrees whose sine and cosine are as `cross` and `dot`.
+// The angle between two directions in degrees, from 0 to 180, by their cross and dot products; NaN of none.
 inline double degrees_of(double cross, double dot) {
     const double scale = 1 / std::max(std::abs(cross), std::abs(dot));  // lest they leave the range of single precision
     return std::abs(std::atan2(static_cast<float>(cross * scale), static_cast<float>(dot * scale))) * degrees;

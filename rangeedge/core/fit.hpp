@@ -97,7 +97,7 @@ struct Projections {
 
 inline Projections joined(const Projections& a, const Projections& b) {
     const double n = a.n + b.n, step = b.mean - a.mean, product = a.n * b.n;
-    const double moved = product / n * step;  // a's sum of distances from the common mean, and less b's
+    const double moved = product / n * step;  // b's sum of distances from the common mean, and less a's
     Projections both;
     both.n = n;
     both.mean = a.mean + b.n / n * step;

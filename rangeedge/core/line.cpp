@@ -111,10 +111,12 @@ void LineReader<T>::take_rows(Strip<T>& strip) const {
     }
 }
 
-// The first `rows` samples of all lines of a strip, of which each row, `step` after the other, has one side by side.
-template <int rows, class T>
+constexpr int tile = 4;  // rows that are turned at a time
+
+// A sample of each row of a tile for all lines of a strip; rows are `step` apart, and have one side by side for each.
+template <class T>
 void turn_tile(const T* source, std::ptrdiff_t step, T* turned, std::ptrdiff_t pitch) {
-    typedef T Quad __attribute__((vector_size(rows * sizeof(T))));
+    typedef T Quad __attribute__((vector_size(tile * sizeof(T))));
     for (int j = 0; j < strip_lines; ++j) {
         const T* first = source + j;
         const Quad samples{first[0], first[step], first[2 * step], first[3 * step]};
@@ -136,14 +138,13 @@ void LineReader<T>::turn_rows(Strip<T>& strip) const {
     // Next samples of all lines lie in different sets of any cache.
     const int pitch = (height + 1023) / 1024 * 1024 + 16;
     strip.y.resize(static_cast<std::size_t>(pitch) * strip.lines.size() + padding);
-    constexpr int tile = 4;
     for (int k = 0; k < height;) {
         const int col = left + slant * k;
         const auto source = static_cast<std::int64_t>(top + down * k) * image_.cols + col;
         const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(down) * image_.cols + slant;  // to the next row
         T* turned = strip.y.data() + k;
         if (k + tile <= height && count == strip_lines && col >= 0 && col + slant * tile + strip_lines <= image_.cols) {
-            turn_tile<tile>(image_.ordinate + source, step, turned, pitch);
+            turn_tile(image_.ordinate + source, step, turned, pitch);
             k += tile;
         } else {
             const int end = std::min(count, image_.cols - col);

@@ -17,7 +17,7 @@ constexpr float lone = 1 / 3.0f;       // what a candidate without neighbours is
 constexpr float precise = 1e30f;       // at most so much does a slope count
 constexpr int kinds = jump_bit | convex_bit | concave_bit;
 constexpr int direction_shift = 8;     // of the bit of a direction, beside the kinds
-constexpr int lanes = 16;
+constexpr int lanes = Floats<16>::count;
 
 // What neighbours are asked for; one array each.
 enum Field { x_field, y_field, evidence_field, fields_of_lines };

@@ -247,7 +247,7 @@ NoiseStatistics noise_statistics(const T* ordinate, int rows, int cols, int thre
     NoiseStatistics result;
     Differences near;
     std::vector<std::vector<float>> bins;
-    Team team(threads);
+    Team team(std::min(threads, 2));  // for more there is too little to do
     parallel_for(2, team, [&](int begin, int end, int) {
         for (int i = begin; i < end; ++i) {
             if (i == 0) {

@@ -10,9 +10,7 @@
 #include <exception>
 #include <functional>
 #include <mutex>
-#include <system_error>
 #include <thread>
-#include <utility>
 #include <vector>
 
 namespace rangeedge {
@@ -22,12 +20,12 @@ namespace rangeedge {
 class Team {
 public:
     explicit Team(int threads) {
-        workers_.reserve(static_cast<std::size_t>(std::max(0, threads - 1)));
+        thrown_.resize(static_cast<std::size_t>(std::max(1, threads)));
+        workers_.reserve(thrown_.size() - 1);
         try {
             for (int i = 1; i < threads; ++i) workers_.emplace_back([this, i] { work(i); });
-        } catch (const std::system_error&) {
+        } catch (const std::exception&) {
         }
-        thrown_.resize(workers_.size() + 1);
     }
     ~Team() {
         if (workers_.empty()) return;
@@ -40,7 +38,7 @@ public:
     int size() const { return static_cast<int>(workers_.size()) + 1; }
 
     // Calls body(thread) once on every thread, counted from 0, and returns when all are done. Should any throw, the
-    // rest still finish and the first exception reaches the caller.
+    // rest still finish, and the exception of the thread that is counted first reaches the caller.
     template <class F>
     void run(F&& body) {
         if (workers_.empty()) {
@@ -52,8 +50,12 @@ public:
         start(&job);
         call(job, 0);
         await([this] { return busy_ == 0; });
-        for (std::exception_ptr& thrown : thrown_)
-            if (thrown) std::rethrow_exception(std::exchange(thrown, nullptr));
+        std::exception_ptr first;
+        for (std::exception_ptr& thrown : thrown_) {
+            if (!first) first = thrown;
+            thrown = nullptr;
+        }
+        if (first) std::rethrow_exception(first);
     }
 
 private:

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "scanline.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <type_traits>
 

@@ -12,6 +12,7 @@ struct Segment {
 };
 
 // The first sample at or after k, and before n, that is valid or is not; else n. NaN marks a sample without data.
+// `padding` samples beyond n may be read.
 int find_valid(const float* y, int k, int n);
 int find_invalid(const float* y, int k, int n);
 inline int find_valid(const double* y, int k, int n) {
