@@ -9,22 +9,31 @@
 #define RANGEEDGE_ALWAYS __attribute__((always_inline))  // of lambdas: out of line they would be narrow
 #define RANGEEDGE_INLINE inline RANGEEDGE_ALWAYS
 
-// Marks a function that is compiled for wider vectors too; RANGEEDGE_VERSIONS defines name(parameters) from a template
-// name_in<bytes>, once for every width. The widest that the processor has is chosen at load time. Without contraction
-// all round alike. Sanitizers cannot run that early.
-#if defined(__x86_64__) && defined(__gnu_linux__) && !defined(__clang__) && !defined(__SANITIZE_ADDRESS__) && \
-    !defined(__SANITIZE_THREAD__) && !defined(RANGEEDGE_NARROW)
-#define RANGEEDGE_AVX512 "avx512f,avx512bw,avx512dq,avx512vl"
-#define RANGEEDGE_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
-#define RANGEEDGE_VERSIONS(result, name, parameters, arguments)                                               \
-    __attribute__((target(RANGEEDGE_AVX512))) result name parameters { return name##_in<64> arguments; } \
-    __attribute__((target("avx2"))) result name parameters { return name##_in<32> arguments; }           \
-    __attribute__((target("default"))) result name parameters { return name##_in<16> arguments; }
-#else
-#define RANGEEDGE_WIDE
-#define RANGEEDGE_VERSIONS(result, name, parameters, arguments) \
-    result name parameters { return name##_in<16> arguments; }
+// RANGEEDGE_WIDE marks a function that is compiled for wider vectors too; RANGEEDGE_VERSIONS defines name(parameters)
+// from a template name_in<bytes>, once for every width. The widest that the processor has, and no wider than
+// RANGEEDGE_WIDEST bytes, is chosen at load time. Without contraction all round alike. Sanitizers cannot run that early.
+#ifndef RANGEEDGE_WIDEST
+#define RANGEEDGE_WIDEST 64
 #endif
+#if !defined(__x86_64__) || !defined(__gnu_linux__) || defined(__clang__) || defined(__SANITIZE_ADDRESS__) || \
+    defined(__SANITIZE_THREAD__) || RANGEEDGE_WIDEST == 16
+#define RANGEEDGE_WIDE
+#define RANGEEDGE_VERSIONS(result, name, parameters, arguments) RANGEEDGE_VERSION(, 16, result, name, parameters, arguments)
+#elif RANGEEDGE_WIDEST == 32
+#define RANGEEDGE_WIDE __attribute__((target_clones("avx2", "default")))
+#define RANGEEDGE_VERSIONS(result, name, parameters, arguments)                                              \
+    RANGEEDGE_VERSION(__attribute__((target("avx2"))), 32, result, name, parameters, arguments)              \
+    RANGEEDGE_VERSION(__attribute__((target("default"))), 16, result, name, parameters, arguments)
+#else
+#define RANGEEDGE_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
+#define RANGEEDGE_VERSIONS(result, name, parameters, arguments)                                              \
+    RANGEEDGE_VERSION(__attribute__((target("avx512f,avx512bw,avx512dq,avx512vl"))), 64, result, name,       \
+                      parameters, arguments)                                                                 \
+    RANGEEDGE_VERSION(__attribute__((target("avx2"))), 32, result, name, parameters, arguments)              \
+    RANGEEDGE_VERSION(__attribute__((target("default"))), 16, result, name, parameters, arguments)
+#endif
+#define RANGEEDGE_VERSION(target, bytes, result, name, parameters, arguments) \
+    target result name parameters { return name##_in<bytes> arguments; }
 
 // Before a loop whose iterations do not depend on each other.
 #if defined(__clang__)
