@@ -278,7 +278,9 @@ void EvenPieces::price(const std::vector<int>& cuts) {
         }
         part(2 * sides)[k] = sigma[i];
     }
-    const auto side = [&](int i) { return Columns{part(i), part(i + 1), part(i + 2), part(i + 3), part(i + 4), part(i + 5)}; };
+    const auto side = [&](int i) {
+        return Columns{part(i), part(i + 1), part(i + 2), part(i + 3), part(i + 4), part(i + 5)};
+    };
     cost_all(count, side(0), side(sides), part(2 * sides), part(2 * sides + 1));
     for (std::size_t k = 0; k < cuts.size(); ++k) cost[static_cast<std::size_t>(cuts[k])] = part(2 * sides + 1)[k];
 }

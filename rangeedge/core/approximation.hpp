@@ -17,8 +17,8 @@ struct Approximation {
     std::size_t count;
 };
 
-// Segments while they are joined: the list of those of all lines of a strip, in order, and of a last one that stands for
-// its end. Numbers of all are kept apart, to be computed side by side; there is room for a few more.
+// Segments while they are joined: the list of those of all lines of a strip, in order, and of a last one that stands
+// for its end. Numbers of all are kept apart, to be computed side by side; there is room for a few more.
 struct Pieces {
     struct Link {
         Segment segment;
@@ -102,8 +102,8 @@ private:
     std::vector<int> cuts_, chosen_;
 };
 
-// Where f and g meet, the place nearest `near`; false where they do not. Places farther than `reach` are not sought, but
-// may be found.
+// Where f and g meet, the place nearest `near`; false where they do not. Places farther than `reach` are not sought,
+// but may be found.
 bool intersection(const Curve& f, const Curve& g, double near, double reach, double& x);
 
 }  // namespace rangeedge

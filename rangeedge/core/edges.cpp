@@ -61,7 +61,8 @@ private:
         };
         const double reach = line.x ? HUGE_VAL : parameters_.max_shift + 1;
         double x = 0;
-        if (!(parameters_.max_shift > 0) || !intersection(a.curves[i], a.curves[i + 1], cut.abscissa, reach, x)) return cut;
+        if (!(parameters_.max_shift > 0)) return cut;
+        if (!intersection(a.curves[i], a.curves[i + 1], cut.abscissa, reach, x)) return cut;
         if (x >= xa && x <= xb)
             return meeting(left.last, right.first, x, left.last + (right.first - left.last) * (x - xa) / (xb - xa));
         const bool leftward = x < xa;
@@ -97,7 +98,8 @@ private:
         const double turn_f = line.turn(tf, zf), turn_g = line.turn(tg, zg);
         const double vf = f.slope_variance(xf), vg = g.slope_variance(xg);
         double jump_significance = std::abs(yf - yg) / (sigma * std::sqrt(f.value_variance(xf) + g.value_variance(xg)));
-        double crease_significance = crease / (degrees * sigma * std::sqrt(turn_f * turn_f * vf + turn_g * turn_g * vg));
+        double crease_significance =
+            crease / (degrees * sigma * std::sqrt(turn_f * turn_f * vf + turn_g * turn_g * vg));
         const double least = std::min(lone_significance, parameters_.min_significance);
         if (!std::isfinite(jump) || !(jump_significance >= least)) jump = jump_significance = 0;
         if (!std::isfinite(crease) || !(crease_significance >= least)) crease = crease_significance = 0;
@@ -175,14 +177,16 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
     std::vector<Candidate> candidates(static_cast<std::size_t>(order));
     Cells cells(image.rows, image.cols);
     for (const Part& part : parts) cells.count(part.found);
-    for (const Part& part : parts) cells.place(part.found, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
+    for (const Part& part : parts)
+        cells.place(part.found, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
     parts.clear();
     pool(candidates, image, parameters, team);
     return candidates;
 }
 
 void put_in_order(std::vector<Candidate>& candidates) {
-    std::sort(candidates.begin(), candidates.end(), [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
+    std::sort(candidates.begin(), candidates.end(),
+              [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
 }
 
 void combine(const std::vector<Candidate>& candidates, float* jump, float* crease, std::uint8_t* kind,

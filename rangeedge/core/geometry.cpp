@@ -64,7 +64,8 @@ void invert_depth(const T* depth, std::size_t size, Real factor, const std::uint
 
 template <class T>
 void mark_boundary(const RangeImage<T>& image, std::uint8_t bit, std::uint8_t* kind) {
-    // Of the last row read and the two before it, with a column on either side that is valid, as all is beyond the image.
+    // Of the last row read and the two before it, with a column on either side that is valid, as all is beyond the
+    // image.
     const int cols = image.cols;
     const auto width = static_cast<std::size_t>(cols) + 2;
     std::vector<std::uint8_t> invalid(3 * width, 0), wide(3 * width, 0);

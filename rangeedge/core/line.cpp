@@ -132,7 +132,8 @@ void LineReader<T>::turn_rows(Strip<T>& strip) const {
     const int count = static_cast<int>(strip.lines.size()), slant = start.dcol, down = start.drow;
     // The first row that any of the lines has, and the column of line 0 there, which may lie outside of the image.
     int top = start.row;
-    for (const Line<T>& line : strip.lines) top = down > 0 ? std::min(top, line.path.row) : std::max(top, line.path.row);
+    for (const Line<T>& line : strip.lines)
+        top = down > 0 ? std::min(top, line.path.row) : std::max(top, line.path.row);
     const int left = start.col - slant * (start.row - top) * down;
     const int height = std::min(down > 0 ? image_.rows - top : top + 1, slant ? image_.cols - left : image_.rows);
     // Next samples of all lines lie in different sets of any cache.

@@ -115,7 +115,8 @@ RANGEEDGE_INLINE void for_each_lanes(const Grid::Near& near, Visit&& visit) {
             const F dx = F::load(x + k) - cx, dy = F::load(y + k) - cy;
             F rest = one - (dx * dx + dy * dy) * share;
             rest = half * (rest + magnitude(rest));  // 0 where negative
-            const I counts = negative(none - (I::load(kinds_there + k) & own)) & negative(I::from(k) - I::all(near.last[i]));
+            const I alike = negative(none - (I::load(kinds_there + k) & own));
+            const I counts = alike & negative(I::from(k) - I::all(near.last[i]));
             visit(k, from_bits(bits(rest * rest) & counts), dx, dy);
         }
 }
@@ -125,7 +126,9 @@ RANGEEDGE_INLINE float evidence_in(const Grid::Near& near) {
     using F = Floats<bytes>;
     const float* evidence = near.grid->field(evidence_field);
     F sum = F::all(0);
-    for_each_lanes<bytes>(near, [&](int k, const F& w, const F&, const F&) RANGEEDGE_ALWAYS { sum += w * F::load(evidence + k); });
+    for_each_lanes<bytes>(near, [&](int k, const F& w, const F&, const F&) RANGEEDGE_ALWAYS {
+        sum += w * F::load(evidence + k);
+    });
     return sum.sum();
 }
 RANGEEDGE_VERSIONS(float, evidence, (const Grid::Near& near), (near))
@@ -225,7 +228,8 @@ RANGEEDGE_INLINE TangentSums tangent_sums_in(const Grid::Near& near, int forward
     sums.place[0] = u.sum(), sums.place[1] = v.sum();
     return sums;
 }
-RANGEEDGE_VERSIONS(TangentSums, tangent_sums, (const Grid::Near& near, int forward_directions), (near, forward_directions))
+RANGEEDGE_VERSIONS(TangentSums, tangent_sums, (const Grid::Near& near, int forward_directions),
+                   (near, forward_directions))
 
 // One step along a scan line.
 struct Step {
@@ -235,7 +239,8 @@ Step step_of(int direction) {
     return {direction == cols_bit ? 0 : 1, direction == rows_bit ? 0 : direction == diag45_bit ? -1 : 1};
 }
 
-// Moves a crease along its scan line onto the line it has in common with its neighbours, unless that leads off the data.
+// Moves a crease along its scan line onto the line it has in common with its neighbours, unless that leads off the
+// data.
 template <class T>
 void align(Candidate& c, const Grid::Near& near, const RangeImage<T>& image, double max_shift) {
     if ((c.kind & jump_bit) || !(c.crease > 0)) return;

@@ -44,7 +44,9 @@ private:
         return static_cast<std::size_t>(row) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(col);
     }
     std::size_t cell_of(const Candidate& c) const {
-        const auto clamped = [](float at, int count) { return std::min(std::max(static_cast<int>(at) / size, 0), count - 1); };
+        const auto clamped = [](float at, int count) {
+            return std::min(std::max(static_cast<int>(at) / size, 0), count - 1);
+        };
         return index(clamped(c.x, cols_), clamped(c.y, rows_));
     }
 

@@ -104,7 +104,7 @@ Differences differences_of(const T* ordinate, std::ptrdiff_t rows, std::ptrdiff_
     return differences;
 }
 
-constexpr int dropped = 20;  // bits of a value, none negative, that its bucket does not tell: 8 buckets an octave are left
+constexpr int dropped = 20;  // bits of a value that its bucket does not tell: 8 buckets an octave are left
 
 // The sum of the squares of values whose bits, as an integer, are below a limit.
 template <int bytes>
@@ -146,7 +146,10 @@ public:
         const auto [b, before] = find(count - 1);
         collect(b, count - 1 - before);
         double sum = squares_below(values_, count_, static_cast<std::int32_t>(b << dropped));
-        for (std::size_t k = 0; k < count - before; ++k) sum += static_cast<double>(within_[k]) * static_cast<double>(within_[k]);
+        for (std::size_t k = 0; k < count - before; ++k) {
+            const auto v = static_cast<double>(within_[k]);
+            sum += v * v;
+        }
         return sum;
     }
     // Whether the value of that rank may exceed another one; only then it is worth finding.

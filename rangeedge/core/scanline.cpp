@@ -30,7 +30,8 @@ RANGEEDGE_INLINE int find_in(const float* y, int k, int n) {
     }
     for (; k < n; k += I::count) {
         const I invalid = negative(validity<bytes>(y + k)), beyond = I::all(n);
-        const I at = valid ? I::from(k) ^ ((I::from(k) ^ beyond) & invalid) : beyond ^ ((I::from(k) ^ beyond) & invalid);
+        const I own = I::from(k), exchanged = (own ^ beyond) & invalid;
+        const I at = (valid ? own : beyond) ^ exchanged;
         const int first = at.joined([](auto a, auto b) RANGEEDGE_ALWAYS { return a < b ? a : b; });
         if (first < n) return first;
     }

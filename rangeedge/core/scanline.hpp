@@ -38,8 +38,8 @@ void for_each_run(const T* y, const T* x, int n, Visit&& visit) {
     }
 }
 
-// The samples of one scan line. `x` is null where they are one unit apart; `scale` is null where one tolerance holds for
-// all, else it multiplies each residual. Of `y` and `scale` `padding` samples beyond the last one may be read.
+// The samples of one scan line. `x` is null where they are one unit apart; `scale` is null where one tolerance holds
+// for all, else it multiplies each residual. Of `y` and `scale` `padding` samples beyond the last one may be read.
 template <class T>
 struct Samples {
     const T* y;

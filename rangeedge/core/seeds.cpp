@@ -34,7 +34,9 @@ void sort(std::vector<Place>& places) {
     for (const Place& place : places) least = std::min(least, place.fall), most = std::max(most, place.fall);
     int passes = 0;
     while (passes < most_passes && !places.empty() && (most - least) >> (passes * bits)) ++passes;
-    const auto digit = [=](const Place& place, int pass) { return ((place.fall - least) >> (pass * bits)) & (digits - 1); };
+    const auto digit = [=](const Place& place, int pass) {
+        return ((place.fall - least) >> (pass * bits)) & (digits - 1);
+    };
     std::vector<std::array<std::uint32_t, digits>> start(most_passes);
     for (const Place& place : places)
         for (int pass = 0; pass < passes; ++pass) ++start[static_cast<std::size_t>(pass)][digit(place, pass)];

@@ -13,7 +13,8 @@ void long_components(const std::uint8_t* edges, int rows, int cols, int min_leng
     const auto stride = static_cast<std::size_t>(cols) + 2, width = static_cast<std::size_t>(cols);
     std::vector<std::uint8_t> image(stride * (static_cast<std::size_t>(rows) + 2), 0);
     for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row)
-        for (std::size_t col = 0; col < width; ++col) image[(row + 1) * stride + col + 1] = edges[row * width + col] != 0;
+        for (std::size_t col = 0; col < width; ++col)
+            image[(row + 1) * stride + col + 1] = edges[row * width + col] != 0;
     std::fill_n(kept, static_cast<std::size_t>(rows) * width, std::uint8_t{0});
     const Components parts(image.data(), rows, cols, 8);
     for (int i = 0; i < parts.count(); ++i) {

@@ -11,14 +11,16 @@
 
 // RANGEEDGE_WIDE marks a function that is compiled for wider vectors too; RANGEEDGE_VERSIONS defines name(parameters)
 // from a template name_in<bytes>, once for every width. The widest that the processor has, and no wider than
-// RANGEEDGE_WIDEST bytes, is chosen at load time. Without contraction all round alike. Sanitizers cannot run that early.
+// RANGEEDGE_WIDEST bytes, is chosen at load time. Without contraction all round alike. Sanitizers cannot run that
+// early.
 #ifndef RANGEEDGE_WIDEST
 #define RANGEEDGE_WIDEST 64
 #endif
 #if !defined(__x86_64__) || !defined(__gnu_linux__) || defined(__clang__) || defined(__SANITIZE_ADDRESS__) || \
     defined(__SANITIZE_THREAD__) || RANGEEDGE_WIDEST == 16
 #define RANGEEDGE_WIDE
-#define RANGEEDGE_VERSIONS(result, name, parameters, arguments) RANGEEDGE_VERSION(, 16, result, name, parameters, arguments)
+#define RANGEEDGE_VERSIONS(result, name, parameters, arguments) \
+    RANGEEDGE_VERSION(, 16, result, name, parameters, arguments)
 #elif RANGEEDGE_WIDEST == 32
 #define RANGEEDGE_WIDE __attribute__((target_clones("avx2", "default")))
 #define RANGEEDGE_VERSIONS(result, name, parameters, arguments)                                              \
