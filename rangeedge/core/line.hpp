@@ -29,7 +29,7 @@ struct OrdinateNoise {
     Noise noise;
     bool projective;
     double sigma(double ordinate, std::int64_t pixel) const {
-        const double z = std::abs(ordinate);  // or its inverse, where projective
+        const double z = std::abs(ordinate);  // a length, or where projective the inverse of one
         const double length = noise.map ? static_cast<double>(noise.map[pixel]) * (projective ? z * z : 1)
                               : projective ? (noise.a * z + noise.b) * z + noise.c
                                            : (noise.c * z + noise.b) * z + noise.a;

@@ -26,7 +26,7 @@ constexpr double trimmed_normal = 0.607;      // deviation of a normal variable 
 constexpr double quantised = 0.05;            // share of differences other than zero that tells steps from edges
 constexpr double least_moved = 0.05;          // quantile of these that stands for one step
 
-// Values by rank. They are put into buckets by size; of a bucket only the ranks asked for are found.
+// Values by rank, for many ranks: they are put into buckets by size; of a bucket only the ranks asked for are found.
 class Ranked {
 public:
     Ranked(const float* values, std::size_t count) : values_(count), starts_(buckets + 1, 0) {
@@ -128,7 +128,7 @@ RANGEEDGE_INLINE double squares_below_in(const float* values, std::size_t count,
 RANGEEDGE_VERSIONS(double, squares_below, (const float* values, std::size_t count, std::int32_t limit),
                    (values, count, limit))
 
-// Values, none negative, by rank: how many there are in each bucket, and all of the bucket that is asked for.
+// Values, none negative, for one rank or two: only counted by buckets, and collected from the one that is asked for.
 class Histogram {
 public:
     // `padding` more values than `count` may be read.

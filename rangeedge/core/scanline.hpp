@@ -81,9 +81,9 @@ private:
 
     std::vector<Samples<T>> lines_;
     std::vector<Node> nodes_;
-    std::vector<int> heads_;               // nodes
+    std::vector<int> heads_;                // the first node of each line
     std::vector<int> pending_, following_;  // nodes of this generation, and of the next one
-    std::vector<Worst> worst_;             // of those pending that are not approximated
+    std::vector<Worst> worst_;              // of those pending that are to be cut
 };
 
 }  // namespace rangeedge
