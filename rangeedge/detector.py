@@ -26,7 +26,6 @@ from ._args import (
     pixel_size,
 )
 from ._constants import EDGE_OCCLUDING
-from ._files import write_atomically
 from .edges import (
     EdgeStrength,
     ScanLineParams,
@@ -37,6 +36,7 @@ from .edges import (
     takes_scan_line_params,
 )
 from .geometry import RangeFrame
+from .io.atomic import write_atomically
 from .noise import NoiseModel
 from .selection import Selection, at_least, selected
 from .thinning import thinEdges

@@ -19,8 +19,8 @@ import numpy as np
 
 from . import _args
 from ._constants import CREASE_MAX, CREASE_NORMAL
-from ._files import write_atomically
 from .edges import edgeStrength
+from .io.atomic import write_atomically
 
 MAX_SLANT = 70.0  # degrees; steeper planes are rarely seen (P§5)
 

@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 import rangeedge
-from rangeedge._files import write_atomically
 from rangeedge.io import imreadRange, imwriteRange
-from rangeedge.pointcloud import lzf_decompress
+from rangeedge.io.atomic import write_atomically
+from rangeedge.io.pcd import lzf_decompress
 from rangeedge.scanners import abwPoints, perceptronPoints
 
 DATA = Path(__file__).parents[2] / "shared" / "data"

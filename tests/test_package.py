@@ -45,8 +45,8 @@ def isolated(code, *options):
 
 def modules():
     """Every module of the package but the one that runs when it is executed."""
-    names = [m.name for m in pkgutil.iter_modules([str(PACKAGE)]) if m.name not in ("_core", "__main__")]
-    return [rangeedge, *(importlib.import_module(f"rangeedge.{name}") for name in names)]
+    names = [m.name for m in pkgutil.walk_packages([str(PACKAGE)], "rangeedge.")]
+    return [rangeedge, *(importlib.import_module(name) for name in names if not name.endswith(("._core", ".__main__")))]
 
 
 def examples():
