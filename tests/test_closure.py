@@ -7,7 +7,8 @@ import pytest
 import rangeedge
 from rangeedge import _core
 from rangeedge.closure import closeContours
-from rangeedge.geometry import range_frame
+from rangeedge.noise import measured_frame
+from rangeedge.options import ScanLineParams
 from rangeedge.surfaces import surface_map
 
 CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
@@ -39,7 +40,7 @@ def is_surface(src, inside, sigma=0.1, tolerance=3.0, share=0.9):
     """The kernel's verdict on a connected set of pixels: nothing dilated."""
     regions = np.zeros(inside.shape, np.int32)
     _core.verified_regions(
-        **dict(surface_map(range_frame("test", src), (sigma, 0.0, 0.0), None), edges=(~inside).view(np.uint8)),
+        **surface_map(measured_frame(src, ScanLineParams(noise=sigma)), (~inside).view(np.uint8)),
         correlation=1.0,
         tolerance=tolerance,
         share=share,

@@ -17,8 +17,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 import rangeedge
 from rangeedge.io import imreadRange, imwriteRange
 from rangeedge.io.atomic import write_atomically
+from rangeedge.io.calibration import abwPoints, perceptronPoints
 from rangeedge.io.pcd import lzf_decompress
-from rangeedge.scanners import abwPoints, perceptronPoints
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 K = [[525.0, 0, 319.5], [0, 524.0, 239.5], [0, 0, 1]]

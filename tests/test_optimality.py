@@ -9,7 +9,7 @@ import pytest
 
 import rangeedge
 from rangeedge import optimality
-from rangeedge._constants import CREASE_MAX, CREASE_NORMAL
+from rangeedge.constants import CREASE_MAX, CREASE_NORMAL
 from rangeedge.optimality import (
     analyseOptimality,
     creaseAngle,

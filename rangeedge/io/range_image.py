@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 
-from .. import _args
-from ..geometry import range_frame
+from .. import _check
+from ..frame import read_frame
+from ..options import ScanLineParams
 from .arrays import read_npy, read_npz, write_npy, write_npz
 from .atomic import write_atomically
 from .pcd import read_pcd, write_pcd
@@ -39,6 +40,7 @@ class RangeImage(NamedTuple):
     geometry: dict[str, Any]
 
 
+@_check.public
 def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None) -> RangeImage:
     """Read a range image and what its file says about its geometry.
 
@@ -90,11 +92,11 @@ def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None)
     >>> image.src.shape, image.src.dtype, list(image.geometry)
     ((480, 640), dtype('uint16'), ['K'])
     """
-    name, data = _read_bytes("imreadRange", path)
+    name, data = _read_bytes(path)
     if calibration is not None:
-        calibration = _args.integer("imreadRange", "calibration", calibration, 1, 2)
+        calibration = _check.integer("calibration", calibration, 1, 2)
         if not data.startswith(ABW_MAGIC):
-            raise _args.fail("imreadRange", "calibration", f"None, as {name!r} is no ABW image", calibration)
+            raise _check.fail("calibration", f"None, as {name!r} is no ABW image", calibration)
     try:
         if data.startswith(ABW_MAGIC):
             return RangeImage(read_abw(data, calibration or abw_calibration(name)), {})
@@ -102,15 +104,16 @@ def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None)
         image = RangeImage(*image) if isinstance(image, tuple) else RangeImage(image, {})
         src = _range_image(image.src)
         if image.geometry:
-            range_frame("imreadRange", src, **image.geometry)
+            read_frame(src, ScanLineParams(**image.geometry))
     except Exception as reason:  # NumPy, zipfile and OpenCV raise two dozen types on a garbled file
         what = reason.err if isinstance(reason, cv2.error) else reason
         if not isinstance(reason, (ValueError, cv2.error)):
             what = f"it is garbled ({type(reason).__name__}: {reason})"
-        raise _args.error("imreadRange", f"cannot read {name!r}: {what}", cv2.Error.StsParseError) from reason
+        raise _check.error(f"cannot read {name!r}: {what}", cv2.Error.StsParseError) from reason
     return RangeImage(src, image.geometry)
 
 
+@_check.public
 def imwriteRange(
     path: str | os.PathLike[str],
     src: np.ndarray,
@@ -162,48 +165,44 @@ def imwriteRange(
     >>> imwriteRange(os.path.join(tempfile.mkdtemp(), "plane.png"), np.full((4, 5), 1500, np.uint16))
     True
     """
-    name = _path("imwriteRange", path)
+    name = _path(path)
     given = {"K": K, "pixelSize": pixelSize, "heightMap": heightMap, "depthFactor": depthFactor}
     given = {key: value for key, value in given.items() if value is not None}
-    range_frame("imwriteRange", src, **given)
+    read_frame(src, ScanLineParams(**given))
     suffix = Path(name).suffix.lower()
     if suffix not in _WRITERS:
-        raise _args.fail(
-            "imwriteRange", "path", f"a file name with one of the suffixes {' '.join(_WRITERS)}", repr(name)
-        )
+        raise _check.fail("path", f"a file name with one of the suffixes {' '.join(_WRITERS)}", repr(name))
     if given and suffix != ".npz":
-        raise _args.fail(
-            "imwriteRange", next(iter(given)), f"None for {suffix} (only .npz holds a geometry)", "a value"
-        )
+        raise _check.fail(next(iter(given)), f"None for {suffix} (only .npz holds a geometry)", "a value")
     if need := _unfit(src):
-        raise _args.fail("imwriteRange", "src", need, _args.described(src), cv2.Error.StsUnsupportedFormat)
+        raise _check.fail("src", need, _check.described(src), cv2.Error.StsUnsupportedFormat)
     try:
         data = _WRITERS[suffix](_native(src), **given)
     except ValueError as reason:
-        raise _args.fail("imwriteRange", "src", f"{reason} for {suffix}", _args.described(src)) from None
+        raise _check.fail("src", f"{reason} for {suffix}", _check.described(src)) from None
     except cv2.error as reason:
-        raise _args.error("imwriteRange", f"OpenCV cannot write {name!r}: {reason.err}") from reason
+        raise _check.error(f"OpenCV cannot write {name!r}: {reason.err}") from reason
     try:
         write_atomically(name, data)
     except (OSError, ValueError) as reason:
         what = getattr(reason, "strerror", None) or reason
-        raise _args.error("imwriteRange", f"cannot write {name!r}: {what}", cv2.Error.StsError) from reason
+        raise _check.error(f"cannot write {name!r}: {what}", cv2.Error.StsError) from reason
     return True
 
 
-def _path(func: str, path: Any) -> str:
+def _path(path: Any) -> str:
     if not isinstance(path, (str, os.PathLike)):
-        raise _args.fail(func, "path", "a file name", type(path).__name__)
+        raise _check.fail("path", "a file name", type(path).__name__)
     return os.fsdecode(path)
 
 
-def _read_bytes(func: str, path: Any) -> tuple[str, bytes]:
-    name = _path(func, path)
+def _read_bytes(path: Any) -> tuple[str, bytes]:
+    name = _path(path)
     try:
         return name, Path(name).read_bytes()
     except (OSError, ValueError) as reason:
         what = getattr(reason, "strerror", None) or reason
-        raise _args.error(func, f"cannot read {name!r}: {what}", cv2.Error.StsObjectNotFound) from reason
+        raise _check.error(f"cannot read {name!r}: {what}", cv2.Error.StsObjectNotFound) from reason
 
 
 def _range_image(array: np.ndarray) -> np.ndarray:
@@ -211,7 +210,7 @@ def _range_image(array: np.ndarray) -> np.ndarray:
     if array.ndim == 3 and array.shape[2] == 1:
         array = array[..., 0]
     if need := _unfit(array):
-        raise ValueError(f"it holds an {_args.described(array)}, no range image, which is {need}")
+        raise ValueError(f"it holds an {_check.described(array)}, no range image, which is {need}")
     return _native(array)
 
 

