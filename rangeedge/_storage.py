@@ -14,7 +14,7 @@ import numpy as np
 from ._check import error, fail
 from .io.atomic import write_atomically
 from .noise_model import NoiseModel
-from .options import ScanLineParams
+from .options import DETECTION
 
 _SUFFIXES = (".xml", ".yml", ".yaml", ".json")  # by which cv2.FileStorage knows the format
 # The first and the last key of a file that `save` has written: YAML that has lost its end is YAML again.
@@ -76,7 +76,7 @@ def write(fs: cv2.FileStorage, node: str, values: Mapping[str, Any]) -> None:
 def read(node: cv2.FileNode) -> dict[str, Any]:
     """The values under a node, in the types of Python."""
     values = {name: _node_value(node.getNode(name)) for name in node.keys()}  # noqa: SIM118
-    for name, option in ScanLineParams.options.items():  # a file storage knows no bool
+    for name, option in DETECTION.items():  # a file storage knows no bool
         if isinstance(option.default, bool) and isinstance(values.get(name), int) and values[name] in (0, 1):
             values[name] = bool(values[name])
     if isinstance(values.get("noise"), dict):

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .noise_model import NoiseModel
-    from .options import ScanLineParams
+    from .options import ScanLineParams, Selection
 
 
 class GeometryOptions(TypedDict, total=False):
@@ -90,10 +90,11 @@ class DetectionOptions(ScanLineOptions, RefinementOptions, total=False):
 
 
 class Accessors:
-    """`setX` and `getX` of every field of `ScanLineParams`."""
+    """`setX` and `getX` of every option of `detectEdges`."""
 
     __slots__ = ()
     _params: ScanLineParams
+    _selection: Selection
 
     def _set(self, name: str, value: Any) -> None:
         raise NotImplementedError
@@ -320,7 +321,7 @@ class Accessors:
         Least depth step, in the unit of the image (that of the points; metres for integers and `depthFactor` 1000).
         None and 0: every step that exceeds the noise. ``numpy.inf`` switches jump edges off.
         """
-        return self._params.jumpThreshold
+        return self._selection.jumpThreshold
 
     def setJumpThreshold(self, jumpThreshold: float | None, /) -> None:
         """setJumpThreshold(jumpThreshold) -> None
@@ -336,7 +337,7 @@ class Accessors:
         Least angle between the surfaces; the paper has 20 for quiet scanners and 30 for noisy ones. ``numpy.inf``
         switches crease edges off.
         """
-        return self._params.creaseThreshold
+        return self._selection.creaseThreshold
 
     def setCreaseThreshold(self, creaseThreshold: float, /) -> None:
         """setCreaseThreshold(creaseThreshold) -> None
@@ -352,7 +353,7 @@ class Accessors:
         Low thresholds as a fraction of the high ones, in (0, 1]; 1 is no hysteresis. Pixels that reach them count where
         they are connected to one that reaches the high ones.
         """
-        return self._params.hysteresis
+        return self._selection.hysteresis
 
     def setHysteresis(self, hysteresis: float, /) -> None:
         """setHysteresis(hysteresis) -> None
@@ -367,7 +368,7 @@ class Accessors:
 
         Least length of a connected line, >= 1: the longer side of its bounding box.
         """
-        return self._params.minLength
+        return self._selection.minLength
 
     def setMinLength(self, minLength: int, /) -> None:
         """setMinLength(minLength) -> None
@@ -382,7 +383,7 @@ class Accessors:
         Whether to remove lines that do not stand out of the noise, by the statistics of all of them (Venkatesh and
         Rosin).
         """
-        return self._params.dynamic
+        return self._selection.dynamic
 
     def setDynamic(self, dynamic: bool, /) -> None:
         """setDynamic(dynamic) -> None

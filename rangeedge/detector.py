@@ -15,7 +15,7 @@ from ._typed import Accessors
 from .edges import EdgeStrength, measure_points, measure_strength
 from .frame import Frame
 from .noise import measured_frame
-from .options import DETECTION, SELECTION, ScanLineParams, parsed, takes
+from .options import DETECTION, SELECTION, ScanLineParams, Selection, parsed, takes
 from .selection import select_strength
 from .thinning import thinEdges
 
@@ -62,8 +62,6 @@ def detectEdges(
     ----------
     src : ndarray
         (H, W) depth, or points (H, W, 3) or (H, W, 4), as in `edgeStrength`.
-    eps : float, optional
-        Splitting tolerance as a length; None derives it from the noise.
     edges : ndarray of shape (H, W), CV_8U, optional
         Receives the result where shape and type fit.
     mask : ndarray of shape (H, W), 8-bit or bool, optional
@@ -101,8 +99,8 @@ def detectEdges(
     (16, 12, 32, 24)
     """
     given = {"jumpThreshold": jumpThreshold, "creaseThreshold": creaseThreshold, "eps": eps, **options}
-    (params,) = parsed(given, ScanLineParams)
-    return deliver("edges", run_detector(measured_frame(src, params, mask), params).thin, edges)
+    params, selection = parsed(given, ScanLineParams, Selection)
+    return deliver("edges", run_detector(measured_frame(src, params, mask), params, selection).thin, edges)
 
 
 @takes(DETECTION)
@@ -123,7 +121,7 @@ def detectEdgesWithStrength(
 
     Parameters
     ----------
-    src, eps, mask
+    src, mask
         As in `detectEdges`.
     {options}
 
@@ -154,15 +152,15 @@ def detectEdgesWithStrength(
     (0.5, 'jump occluding')
     """
     given = {"jumpThreshold": jumpThreshold, "creaseThreshold": creaseThreshold, "eps": eps, **options}
-    (params,) = parsed(given, ScanLineParams)
-    found = run_detector(measured_frame(src, params, mask), params)
+    params, selection = parsed(given, ScanLineParams, Selection)
+    found = run_detector(measured_frame(src, params, mask), params, selection)
     return found.thin, found.strength
 
 
-def run_detector(frame: Frame, params: ScanLineParams) -> Detection:
+def run_detector(frame: Frame, params: ScanLineParams, selection: Selection) -> Detection:
     """The edges of a checked range image: strengths, those of them that count, and their middle lines."""
     strength = measure_strength(frame, params)
-    selected = select_strength(strength, params)
+    selected = select_strength(strength, selection)
     return Detection(strength, selected, thinEdges(selected))
 
 
@@ -208,7 +206,7 @@ def createScanLineDetector(params: ScanLineParams | None = None) -> ScanLineDete
 class ScanLineDetector(Accessors):
     """The edge detector as an object in the manner of `cv2.Algorithm`: parameters once, then frame after frame.
 
-    Made by `createScanLineDetector`. Every field of `ScanLineParams` has a `setX` and a `getX`, the thresholds too.
+    Made by `createScanLineDetector`. Every option of `detectEdges` has a `setX` and a `getX`.
     `noise=None` estimates the noise of every frame; where that does not change,
     ``detector.setNoise(estimateNoise(frame))`` saves the time. Arrays are copied in, and those handed out are
     read-only. One detector may work in several threads at a time.
@@ -228,31 +226,31 @@ class ScanLineDetector(Accessors):
     ([525.0, 0.0, 319.5], 20.0)
     """
 
-    __slots__ = ("_params",)
+    __slots__ = ("_params", "_selection")
 
     def __init__(self) -> None:
-        self._params = ScanLineParams()
+        self.clear()
 
     if not TYPE_CHECKING:
 
         def __setattr__(self, name: str, value: Any) -> None:
-            if name != "_params":
-                upper = name[:1].upper() + name[1:]
-                way_out = (
-                    f"call set{upper}({name})" if name in ScanLineParams.options else "its parameters have setters"
-                )
+            if name not in ScanLineDetector.__slots__:
+                way_out = f"call {_setter(name)}({name})" if name in DETECTION else "its parameters have setters"
                 raise AttributeError(f"ScanLineDetector has no attribute {name!r} to set; {way_out}")
             super().__setattr__(name, value)
 
     def _set(self, name: str, value: Any) -> None:
         try:
-            self._params = replace(self._params, **{name: value})
+            if name in SELECTION:
+                self._selection = replace(self._selection, **{name: value})
+            else:
+                self._params = replace(self._params, **{name: value})
         except error as problem:
-            problem.name(f"ScanLineDetector.set{name[0].upper()}{name[1:]}")
+            problem.name(f"ScanLineDetector.{_setter(name)}")
             raise
 
     def __repr__(self) -> str:
-        return repr(self._params).replace("ScanLineParams", "ScanLineDetector", 1)
+        return f"ScanLineDetector({', '.join(filter(None, (self._params.changed(), self._selection.changed())))})"
 
     @public
     def detect(self, src: np.ndarray, mask: np.ndarray | None = None) -> EdgeStrength:
@@ -291,15 +289,15 @@ class ScanLineDetector(Accessors):
         """
         thresholds = {"jumpThreshold": jumpThreshold, "creaseThreshold": creaseThreshold}
         given = {name: value for name, value in thresholds.items() if value is not _OWN}
-        params = replace(self._params, **given, **options)
-        return deliver("edges", run_detector(measured_frame(src, params, mask), params).thin, edges)
+        params, selection = self._params, replace(self._selection, **given, **options)
+        return deliver("edges", run_detector(measured_frame(src, params, mask), params, selection).thin, edges)
 
     def clear(self) -> None:
         """Give every parameter its default again.
 
         clear() -> None
         """
-        self._params = ScanLineParams()
+        self._params, self._selection = ScanLineParams(), Selection()
 
     def empty(self) -> bool:
         """Whether there is nothing to detect with: never.
@@ -326,7 +324,7 @@ class ScanLineDetector(Accessors):
         if not isinstance(fs, cv2.FileStorage) or not fs.isOpened():
             raise fail("fs", "a cv2.FileStorage opened for writing", described(fs))
         try:
-            _storage.write(fs, name, vars(self._params))
+            _storage.write(fs, name, {**vars(self._params), **vars(self._selection)})
         except cv2.error as problem:
             raise error(f"cannot write into `fs`: {problem.err}") from problem
 
@@ -338,7 +336,7 @@ class ScanLineDetector(Accessors):
         """
         if not isinstance(node, cv2.FileNode) or not node.isMap():
             raise fail("node", "a cv2.FileNode that maps parameters to values", described(node))
-        self._params = _params(**_storage.read(node))
+        self._params, self._selection = _parameters(**_storage.read(node))
 
     @public
     def save(self, filename: str | os.PathLike[str]) -> None:
@@ -349,7 +347,7 @@ class ScanLineDetector(Accessors):
         The suffix decides on the format: ``.xml``, ``.yml``, ``.yaml`` or ``.json``. Either the whole file is written
         or nothing.
         """
-        _storage.save(filename, self.getDefaultName(), vars(self._params))
+        _storage.save(filename, self.getDefaultName(), {**vars(self._params), **vars(self._selection)})
 
     @public
     def load(self, filename: str | os.PathLike[str]) -> None:
@@ -361,12 +359,17 @@ class ScanLineDetector(Accessors):
         """
         name, values = _storage.load(filename, self.getDefaultName())
         try:
-            self._params = _params(**values)
+            self._params, self._selection = _parameters(**values)
         except error as problem:
             raise error(f"{name!r}: {problem.err}", problem.code) from None
 
 
-@takes(ScanLineParams.options)
-def _params(**options: Any) -> ScanLineParams:
-    """The parameters of these names, others refused."""
-    return ScanLineParams(**options)
+@takes(DETECTION)
+def _parameters(**options: Any) -> tuple[ScanLineParams, Selection]:
+    """The parameters of these names; others are refused."""
+    params, selection = parsed(options, ScanLineParams, Selection)
+    return params, selection
+
+
+def _setter(name: str) -> str:
+    return f"set{name[0].upper()}{name[1:]}"

@@ -48,6 +48,8 @@ def distanceTransform(edges: np.ndarray, dst: np.ndarray | None = None) -> np.nd
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import distanceTransform
     >>> edges = np.array([[255, 0, 0, 0]], np.uint8)
     >>> distanceTransform(edges)
     array([[0., 1., 2., 3.]], dtype=float32)
@@ -86,6 +88,8 @@ def distanceTransformWithLabels(edges: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import distanceTransformWithLabels
     >>> edges = np.array([[255, 0, 0, 0, 255]], np.uint8)
     >>> distanceTransformWithLabels(edges)[1]
     array([[0, 0, 0, 4, 4]], dtype=int32)
@@ -151,6 +155,8 @@ def salienceDistanceTransform(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import salienceDistanceTransform
     >>> salience = np.array([[51, 0, 0, 0, 0, 0, 0, 255]], np.uint8)
     >>> salienceDistanceTransform(salience)
     array([[0., 5., 5., 4., 3., 2., 1., 0.]], dtype=float32)
@@ -189,6 +195,8 @@ def salienceDistanceTransformWithLabels(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import salienceDistanceTransformWithLabels
     >>> salience = np.array([[51, 0, 0, 0, 0, 0, 0, 255]], np.uint8)
     >>> salienceDistanceTransformWithLabels(salience)[1]
     array([[0, 0, 7, 7, 7, 7, 7, 7]], dtype=int32)

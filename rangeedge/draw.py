@@ -82,6 +82,7 @@ def drawEdges(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import drawEdges
     >>> depth, edges = np.ones((4, 6), np.float32), np.zeros((4, 6), np.uint8)
     >>> edges[:, 2] = 255
     >>> drawEdges(depth, edges)[0, 2]
@@ -135,6 +136,7 @@ def drawRegions(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import drawRegions
     >>> drawRegions(np.int32([[0, 1, 2, 1]]))[0]
     array([[  0,   0,   0],
            [238, 204, 136],
@@ -190,6 +192,7 @@ def colorizeDistance(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import colorizeDistance
     >>> colorizeDistance(np.float32([[0, 1, np.inf]]))[0]
     array([[  4,   0,   0],
            [164, 255, 252],
@@ -252,6 +255,7 @@ def drawOverview(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import drawOverview
     >>> depth, none = np.ones((48, 64), np.float32), np.zeros((48, 64), np.float32)
     >>> kind = np.zeros((48, 64), np.uint8)
     >>> drawOverview(depth, (none, none, kind, none), kind).dtype

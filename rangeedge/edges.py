@@ -169,8 +169,6 @@ def edgeStrength(
         Integers are divided by `depthFactor` and invalid where <= 0. With `K`, depths that are not positive and
         finite are invalid; without it, only non-finite values are. Heights (`heightMap`) may not be signed integers.
         A point is invalid if a coordinate is not finite, if all are 0, or if it lies behind the viewpoint.
-    eps : float, optional
-        Splitting tolerance as a length; None derives it from the noise.
     mask : ndarray of shape (H, W), 8-bit or bool, optional
         Non-zero where pixels are used.
     {options}
@@ -231,7 +229,7 @@ def edgePoints(
 
     Parameters
     ----------
-    src, eps, mask
+    src, mask
         As in `edgeStrength`.
     {options}
 

@@ -36,7 +36,7 @@ class NoiseModel:
     >>> NoiseModel(c=0.0014)(2.0)
     0.0056
     >>> NoiseModel.kinect1()
-    NoiseModel(c=0.001425, correlation=2.0)
+    NoiseModel(c=0.001425, correlation=2)
     """
 
     a: float = 0.0
@@ -54,7 +54,7 @@ class NoiseModel:
 
     def __repr__(self) -> str:
         told = {name: value for name, value in vars(self).items() if value != (name == "correlation")}
-        return f"NoiseModel({', '.join(f'{name}={value:g}' for name, value in told.items())})"
+        return f"NoiseModel({', '.join(f'{name}={value:.4g}' for name, value in told.items())})"
 
     def __call__(self, z: Any) -> Any:
         return self.a + (self.b + self.c * z) * z

@@ -3,7 +3,7 @@
 A class of options is a frozen dataclass, whose fields are made by `option`; it checks its values when it is made, and
 keeps each in its own type. From it come the keywords of the functions (`takes`), their signatures and documentation,
 the accessors of the detector and the types of all of them (`_typed.py`, which ``python tests/typed.py`` writes), the
-flags of the command line, and what a detector saves: every field of `ScanLineParams`.
+flags of the command line, and what a detector saves: every field of `ScanLineParams` and of `Selection`.
 """
 
 from __future__ import annotations
@@ -134,10 +134,14 @@ class Options:
 
     __hash__ = None  # type: ignore[assignment]  # arrays have no hash
 
-    def __repr__(self) -> str:
+    def changed(self) -> str:
+        """The options that are not at their default, as keywords."""
         own = {name: getattr(self, name) for name in self.options}
         changed = [name for name, value in own.items() if not np.array_equal(value, self.options[name].default)]
-        return f"{type(self).__name__}({', '.join(f'{name}={_check.described(own[name])}' for name in changed)})"
+        return ", ".join(f"{name}={_check.described(own[name])}" for name in changed)
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.changed()})"
 
 
 def declared(kind: type[_Kind]) -> type[_Kind]:
@@ -169,8 +173,7 @@ class ScanLineParams(Options):
 
     ScanLineParams([eps[, epsFactor[, K[, ...]]]])
 
-    The functions that detect edges take each of these by keyword; those that only measure strengths, all but the last
-    five, which select edges by them.
+    The functions that detect edges take each of these by keyword.
 
     Parameters
     ----------
@@ -188,8 +191,8 @@ class ScanLineParams(Options):
     4.0
     >>> ScanLineParams.paper().fit == FIT_INTERP
     True
-    >>> ScanLineParams(maxGap=4, minLength=9)
-    ScanLineParams(maxGap=4, minLength=9)
+    >>> ScanLineParams(maxGap=4, noise=0.002)
+    ScanLineParams(noise=0.002, maxGap=4)
     """
 
     eps: float | None = option(
@@ -331,13 +334,25 @@ class ScanLineParams(Options):
         "Candidates are dropped whose significance, joined with that of their neighbours, is below this; 0 keeps all.",
         group="scan lines",
     )
+
+    @classmethod
+    def paper(cls, **options: Any) -> ScanLineParams:
+        """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept."""
+        basic = {"fit": FIT_INTERP, "crease": CREASE_MAX, "maxShift": 0.0, "maxGap": 0}
+        return cls(**{**basic, "mergeSignificance": 0.0, "minSignificance": 0.0, **options})
+
+
+@declared
+@dataclass(frozen=True, eq=False, repr=False)
+class Selection(Options):
+    """Which strengths make an edge."""
+
     jumpThreshold: float | None = option(
         None,
         _or_none(_check.threshold),
         "float or None",
         "Least depth step, in the unit of the image (that of the points; metres for integers and `depthFactor` 1000)."
         " None and 0: every step that exceeds the noise. ``numpy.inf`` switches jump edges off.",
-        group="selection",
         flagged="least jump, a length (default: any beyond the noise)",
     )
     creaseThreshold: float = option(
@@ -347,7 +362,6 @@ class ScanLineParams(Options):
         "Least angle between the surfaces; the paper has 20 for quiet scanners and 30 for noisy ones. ``numpy.inf``"
         " switches crease edges off.",
         unit="degrees",
-        group="selection",
     )
     hysteresis: float = option(
         1.0,
@@ -355,7 +369,6 @@ class ScanLineParams(Options):
         "float",
         "Low thresholds as a fraction of the high ones, in (0, 1]; 1 is no hysteresis. Pixels that reach them count"
         " where they are connected to one that reaches the high ones.",
-        group="selection",
     )
     minLength: int = option(
         5,
@@ -363,7 +376,6 @@ class ScanLineParams(Options):
         "int",
         "Least length of a connected line, >= 1: the longer side of its bounding box.",
         unit="pixels",
-        group="selection",
         read=int,
         metavar="N",
     )
@@ -373,15 +385,8 @@ class ScanLineParams(Options):
         "bool",
         "Whether to remove lines that do not stand out of the noise, by the statistics of all of them (Venkatesh and"
         " Rosin).",
-        group="selection",
         read=bool,
     )
-
-    @classmethod
-    def paper(cls, **options: Any) -> ScanLineParams:
-        """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept."""
-        basic = {"fit": FIT_INTERP, "crease": CREASE_MAX, "maxShift": 0.0, "maxGap": 0}
-        return cls(**{**basic, "mergeSignificance": 0.0, "minSignificance": 0.0, **options})
 
 
 @declared
@@ -480,8 +485,8 @@ def _of(kind: type[Options], *groups: str) -> dict[str, Option]:
 # What functions take as keywords.
 GEOMETRY = _of(ScanLineParams, "geometry")
 MEASURED = _of(ScanLineParams, "geometry", "noise")
-SCAN_LINES = _of(ScanLineParams, "geometry", "noise", "scan lines")
-SELECTION = _of(ScanLineParams, "selection")
+SCAN_LINES = ScanLineParams.options
+SELECTION = Selection.options
 DETECTION = {**SCAN_LINES, **SELECTION}
 SEEDING = Seeding.options
 GROWING = {**MEASURED, **_of(Growing, "regions")}
@@ -516,7 +521,7 @@ def takes(options: Mapping[str, Option], **shown_default: Any) -> Callable[[_Fun
             return function(*args, **kwargs)
 
         call.__signature__ = signature.replace(parameters=own + shown)  # type: ignore[attr-defined]
-        call.__doc__ = _with_options(call.__doc__, others)
+        call.__doc__ = _with_options(call.__doc__, options.values())
         return call  # type: ignore[return-value]
 
     return taking

@@ -13,7 +13,7 @@ from .detector import run_detector
 from .distance import distanceTransform
 from .frame import Frame
 from .noise import measured_frame
-from .options import GROWING, SEGMENTING, Growing, ScanLineParams, parsed, takes
+from .options import GROWING, SEGMENTING, Growing, ScanLineParams, Selection, parsed, takes
 from .seeds import find_seeds, label_statistics
 from .surfaces import surface_map, surfaces_of
 
@@ -249,7 +249,7 @@ def _segmented(
 ) -> tuple[Frame, np.ndarray]:
     params, growing = parsed(options, ScanLineParams, Growing)
     frame = measured_frame(src, params, mask)
-    edges = run_detector(frame, params).thin if edges is None else image8("edges", edges, frame.shape)
+    edges = run_detector(frame, params, Selection()).thin if edges is None else image8("edges", edges, frame.shape)
     return frame, seeded_regions(frame, edges, growing)[1]
 
 

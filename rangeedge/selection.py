@@ -12,7 +12,7 @@ from . import _check, _core
 from ._check import public
 from .constants import EDGE_OCCLUDING
 from .edges import EdgeStrength
-from .options import SELECTION, ScanLineParams, takes
+from .options import SELECTION, Selection, takes
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -239,11 +239,11 @@ def _of_strength(
     dst: np.ndarray | None = None,
     **options: Any,
 ) -> np.ndarray:
-    params = ScanLineParams(jumpThreshold=jumpThreshold, creaseThreshold=creaseThreshold, **options)
+    selection = Selection(jumpThreshold=jumpThreshold, creaseThreshold=creaseThreshold, **options)
     jump = _check.strength32f("strength.jump", strength.jump)
     crease = _check.strength32f("strength.crease", strength.crease, jump.shape)
     kind = _check.image8("strength.kind", strength.kind, jump.shape)
-    edges = select_strength(EdgeStrength(jump, crease, kind, strength.significance), params)
+    edges = select_strength(EdgeStrength(jump, crease, kind, strength.significance), selection)
     return _check.deliver("dst", edges, dst)
 
 
@@ -260,30 +260,30 @@ def _of_maps(
     jump = _check.strength32f("jump", jump)
     crease = _check.strength32f("crease", crease, jump.shape)
     jumpThreshold = _check.threshold("jumpThreshold", jumpThreshold)
-    params = ScanLineParams(jumpThreshold=jumpThreshold, creaseThreshold=creaseThreshold, **{"minLength": 1, **options})
-    return _check.deliver("dst", select_maps(jump, crease, params), dst)
+    selection = Selection(jumpThreshold=jumpThreshold, creaseThreshold=creaseThreshold, **{"minLength": 1, **options})
+    return _check.deliver("dst", select_maps(jump, crease, selection), dst)
 
 
 selectEdges.__signature__ = inspect.signature(_of_strength)  # type: ignore[attr-defined]
 
 
-def select_strength(strength: EdgeStrength, params: ScanLineParams) -> np.ndarray:
+def select_strength(strength: EdgeStrength, selection: Selection) -> np.ndarray:
     """The edge map before thinning: jumps on their nearer side, and creases that do not stand alone."""
     jump = cv2.copyTo(strength.jump, strength.kind & np.uint8(EDGE_OCCLUDING))
-    crease = _unfrayed(strength.crease, params.hysteresis * params.creaseThreshold)
-    return select_maps(jump, crease, params)
+    crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold)
+    return select_maps(jump, crease, selection)
 
 
-def select_maps(jump: np.ndarray, crease: np.ndarray, params: ScanLineParams) -> np.ndarray:
+def select_maps(jump: np.ndarray, crease: np.ndarray, selection: Selection) -> np.ndarray:
     """The edge map, 0 and 255, of checked strengths."""
-    thresholds, hysteresis = (params.jumpThreshold or 0.0, params.creaseThreshold), params.hysteresis
+    thresholds, hysteresis = (selection.jumpThreshold or 0.0, selection.creaseThreshold), selection.hysteresis
     edges = _reaching(jump, crease, thresholds)
     if hysteresis < 1:
         low = (hysteresis * thresholds[0], hysteresis * thresholds[1])
         edges = _connected_to(edges, _reaching(jump, crease, low))
-    if params.minLength > 1:
-        edges = _long_components(edges, params.minLength)
-    if params.dynamic:
+    if selection.minLength > 1:
+        edges = _long_components(edges, selection.minLength)
+    if selection.dynamic:
         edges &= _outstanding(jump) | _outstanding(crease)
     return edges.view(np.uint8) * np.uint8(255)
 

@@ -52,6 +52,7 @@ def thinEdges(edges: np.ndarray, method: int = THIN_SKELETON, dst: np.ndarray | 
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import thinEdges
     >>> edges = np.zeros((4, 6), np.uint8)
     >>> edges[1:3] = 255
     >>> thinEdges(edges)

@@ -407,7 +407,7 @@ class TestHelp:
                      "--directions", "--fit", "--measure", "--crease ", "--max-shift", "--max-gap",
                      "--min-significance", "--jump-threshold", "--crease-threshold", "--min-length"):  # fmt: skip
             assert flag in said
-        assert "(default: 30.0)" in said
+        assert "(degrees; default: 30)" in " ".join(said.split())
         assert "--depth-factor X Divides integer values" in " ".join(said.split())
 
     def test_version(self, capsys):

@@ -267,31 +267,9 @@ def test_the_frame_does_not_share_what_it_changes(pinhole):
         assert np.array_equal(z, pinhole.depth)
 
 
-def test_errors_name_the_function():
-    with pytest.raises(rangeedge.error, match="someFunction: `src` must be"):
-        frame_of(np.zeros(3))
-    with pytest.raises(rangeedge.error, match="someFunction: `mask` must be"):
-        frame_of(np.zeros((3, 3)), mask=np.zeros((3, 4), np.uint8))
-
-
-def test_points_left_out_do_not_turn_the_viewing_axis():
-    z = np.where(np.arange(60) < 30, 1.0, 1.2) * np.ones((50, 1))
-    K = np.array([[80.0, 0, 29.5], [0, 80, 24.5], [0, 0, 1]])
-    v, u = np.mgrid[:50, :60]
-    points = np.dstack([(u - 29.5) / 80 * z, (v - 24.5) / 80 * z, z])
-    expected = edgeStrength(z, K=K, noise=0.001).jump.max()
-    nothing, behind = points.copy(), points.copy()
-    nothing[3, 4] = 0
-    behind[3, 4] = (0.1, 0.1, -1)
-    mask = np.ones(z.shape, np.uint8)
-    mask[3, 4] = 0
-    for src, inside in ((nothing, None), (nothing, mask), (behind, mask)):
-        assert edgeStrength(src, noise=0.001, mask=inside).jump.max() == pytest.approx(expected, rel=1e-6)
-
-
-def test_masked_arrays_and_whole_heights_are_refused():
-    heights = np.ma.masked_equal(np.arange(400.0).reshape(20, 20), 7)
-    with pytest.raises(rangeedge.error, match=r"edgeStrength: `src` must be .* got a masked array"):
-        edgeStrength(heights, heightMap=True)
-    with pytest.raises(rangeedge.error, match="edgeStrength: `src` must be heights as floats"):
-        edgeStrength(np.arange(400, dtype=np.int16).reshape(20, 20), heightMap=True)
+@pytest.mark.parametrize("function", [rangeedge.estimateNoise, edgeStrength, rangeedge.segmentRegionsWithStats])
+def test_errors_name_the_function(function):
+    with pytest.raises(rangeedge.error, match=rf"{function.__name__}: `src` must be"):
+        function(np.zeros(3))
+    with pytest.raises(rangeedge.error, match=rf"{function.__name__}: `mask` must be"):
+        function(np.zeros((3, 3)), mask=np.zeros((3, 4), np.uint8))

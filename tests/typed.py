@@ -7,7 +7,7 @@ import textwrap
 from pathlib import Path
 
 from rangeedge import options
-from rangeedge.options import Option, ScanLineParams
+from rangeedge.options import DETECTION, SELECTION, Option
 
 TARGET = Path(__file__).resolve().parents[1] / "rangeedge" / "_typed.py"
 KEYWORDS = {
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from .noise_model import NoiseModel
-    from .options import ScanLineParams
+    from .options import ScanLineParams, Selection
 
 
 '''
@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 def text() -> str:
     """What the file should hold."""
     keywords = "\n\n".join(typed_dict(name, group) for name, group in KEYWORDS.items())
-    return f"{HEAD}{keywords}\n\n{DETECTION}\n\n{accessors()}"
+    return f"{HEAD}{keywords}\n\n{DETECTION_CLASS}\n\n{accessors()}"
 
 
 def typed_dict(name: str, group: dict[str, Option]) -> str:
@@ -49,23 +49,23 @@ def typed_dict(name: str, group: dict[str, Option]) -> str:
     return f"class {name}Options(TypedDict, total=False):\n{''.join(lines)}"
 
 
-DETECTION = "class DetectionOptions(ScanLineOptions, RefinementOptions, total=False):\n    pass\n"
+DETECTION_CLASS = "class DetectionOptions(ScanLineOptions, RefinementOptions, total=False):\n    pass\n"
 
 
 def accessors() -> str:
     """A `getX` and a `setX` for every parameter of the detector."""
     methods = []
-    for name, own in ScanLineParams.options.items():
-        upper = name[0].upper() + name[1:]
+    for name, own in DETECTION.items():
+        upper, home = name[0].upper() + name[1:], "_selection" if name in SELECTION else "_params"
         doc = textwrap.indent(textwrap.fill(own.text, 112, break_on_hyphens=False), "        ")
         methods.append(
             f"    def get{upper}(self) -> {own.kept or own.annotation}:\n"
             f'        """get{upper}() -> retval\n\n{doc}\n        """\n'
-            f"        return self._params.{name}  # type: ignore[return-value]\n"
+            f"        return self.{home}.{name}  # type: ignore[return-value]\n"
             if own.kept
             else f"    def get{upper}(self) -> {own.annotation}:\n"
             f'        """get{upper}() -> retval\n\n{doc}\n        """\n'
-            f"        return self._params.{name}\n"
+            f"        return self.{home}.{name}\n"
         )
         methods.append(
             f"    def set{upper}(self, {name}: {own.annotation}, /) -> None:\n"
@@ -74,9 +74,10 @@ def accessors() -> str:
         )
     head = (
         "class Accessors:\n"
-        '    """`setX` and `getX` of every field of `ScanLineParams`."""\n\n'
+        '    """`setX` and `getX` of every option of `detectEdges`."""\n\n'
         "    __slots__ = ()\n"
-        "    _params: ScanLineParams\n\n"
+        "    _params: ScanLineParams\n"
+        "    _selection: Selection\n\n"
         "    def _set(self, name: str, value: Any) -> None:\n"
         "        raise NotImplementedError\n\n"
     )

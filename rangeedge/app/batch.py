@@ -15,7 +15,7 @@ import numpy as np
 from .. import __version__
 from .._check import boolean, described, error, fail, integer
 from ..io import RangeImage, imreadRange
-from ..options import DETECTION, ScanLineParams, parsed, takes
+from ..options import DETECTION, ScanLineParams, Selection, parsed, takes
 from .results import EdgeResults, edge_files, find_edges, plain, write_folder
 
 
@@ -86,7 +86,7 @@ def detectBatch(
         raise fail("paths", "an iterable of file names", described(paths))
     jobs = integer("jobs", jobs, 1)
     force = boolean("force", force)
-    parsed(options, ScanLineParams)
+    parsed(options, ScanLineParams, Selection)
     options |= {name: value for name, value in (("mask", mask), ("calibration", calibration)) if value is not None}
     folders: dict[Path, str] = {}
     for path in map(os.fspath, paths):

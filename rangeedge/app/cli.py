@@ -16,7 +16,7 @@ import numpy as np
 
 from .. import __version__
 from .._check import error, named
-from ..options import GEOMETRY, Growing, Option, ScanLineParams
+from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing, Option
 from .batch import detect_file, detectBatch, read_image
 from .results import (
     EDGE_FILES,
@@ -88,7 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     segment.add_argument("image", metavar="IMAGE", help=_INPUT)
     _add_out(segment)
     _add_geometry(segment)
-    _add_growing(segment)
+    _add_options(segment, "how regions grow", Growing.options)
     _add_detector(segment)
 
     batch = _command(commands, "batch", _batch, "find the edges of many range images")
@@ -145,8 +145,8 @@ def _add_out(parser: argparse.ArgumentParser, more: str = "files of the same nam
 def _add_geometry(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("geometry of the image")
     projection = group.add_mutually_exclusive_group()
-    for name in GEOMETRY:
-        _add_option(projection if name in ("K", "pixelSize") else group, ScanLineParams, name)
+    for name, option in GEOMETRY.items():
+        _add_option(projection if name in ("K", "pixelSize") else group, option)
     group.add_argument("--mask", type=_mask, metavar="FILE", help="8-bit image, not 0 where pixels are used")
     group.add_argument(
         "--calibration", type=int, choices=(1, 2), help="of an ABW scanner (default: by the file's name)"
@@ -154,41 +154,38 @@ def _add_geometry(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_detector(parser: argparse.ArgumentParser) -> None:
-    selection = parser.add_argument_group("which edges are kept")
-    detection = parser.add_argument_group("how edges are found")
-    for name, option in ScanLineParams.options.items():
-        if name not in GEOMETRY:
-            _add_option(selection if option.group == "selection" else detection, ScanLineParams, name)
+    _add_options(parser, "which edges are kept", SELECTION)
+    own = {name: option for name, option in SCAN_LINES.items() if name not in GEOMETRY}
+    _add_options(parser, "how edges are found (the fields of ScanLineParams)", own)
 
 
-def _add_growing(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("how regions grow")
-    for name in Growing.options:
-        _add_option(group, Growing, name)
+def _add_options(parser: argparse.ArgumentParser, title: str, options: Mapping[str, Option]) -> None:
+    group = parser.add_argument_group(title)
+    for option in options.values():
+        _add_option(group, option)
 
 
-def _add_option(group: Any, kind: type[ScanLineParams] | type[Growing], name: str) -> None:
-    option = kind.options[name]
-    flag, text = _flag(name), _help(option, kind.options)
+def _add_option(group: Any, option: Option) -> None:
+    flag, text = _flag(option.name), _help(option)
     if option.read is bool:
-        group.add_argument(flag, action="store_true", dest=name, help=text)
+        group.add_argument(flag, action="store_true", dest=option.name, help=text)
     elif option.choices:
         read = _reader(lambda word: _chosen(option, word))
-        group.add_argument(flag, type=read, metavar="|".join(option.choices), dest=name, help=text)
+        group.add_argument(flag, type=read, metavar="|".join(option.choices), dest=option.name, help=text)
     else:
-        group.add_argument(flag, type=_reader(option.read), metavar=option.metavar, dest=name, help=text)
+        group.add_argument(flag, type=_reader(option.read), metavar=option.metavar, dest=option.name, help=text)
 
 
 def _flag(name: str) -> str:
     return "-K" if name == "K" else "--" + re.sub(r"([A-Z])", lambda m: "-" + m[1].lower(), name)
 
 
-def _help(option: Option, others: Mapping[str, Option]) -> str:
+def _help(option: Option) -> str:
     """What the option means, in the words of the command line."""
     if option.flagged:
         return option.flagged
     text, default = option.text, option.default
-    for name in others:
+    for name in (*DETECTION, *Growing.options):
         text = text.replace(f"`{name}`", _flag(name))
     for word, value in option.choices.items():
         text = text.replace(next(name for name, other in option.constants.items() if other == value), word)
@@ -196,7 +193,7 @@ def _help(option: Option, others: Mapping[str, Option]) -> str:
     known = [option.unit] if option.unit else []
     if default is not None and default is not False:
         known.append(f"default: {default if option.choices else f'{default:g}'}")
-    return text.replace("%", "%%") + (f" ({'; '.join(known)})" if known else "")
+    return text.replace("``numpy.inf``", "inf").replace("%", "%%") + (f" ({'; '.join(known)})" if known else "")
 
 
 def _reader(read: Callable[[str], Any]) -> Callable[[str], Any]:

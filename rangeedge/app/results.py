@@ -25,7 +25,7 @@ from ..draw import drawOverview, region_overview
 from ..edges import EdgeStrength, measure_points
 from ..frame import Frame
 from ..noise import measured_frame
-from ..options import DETECTION, Growing, ScanLineParams, parsed, takes
+from ..options import DETECTION, Growing, ScanLineParams, Selection, parsed, takes
 from ..regions import described_regions, seeded_regions
 
 _REPORT = "report.json"
@@ -75,12 +75,12 @@ class EdgeResults(NamedTuple):
 @takes(DETECTION)
 def find_edges(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> EdgeResults:
     """What `detectEdges` returns, with all that it computes on the way."""
-    (params,) = parsed(options, ScanLineParams)
-    return _edges_of(measured_frame(src, params, mask), params)
+    params, selection = parsed(options, ScanLineParams, Selection)
+    return _edges_of(measured_frame(src, params, mask), params, selection)
 
 
-def _edges_of(frame: Frame, params: ScanLineParams) -> EdgeResults:
-    strength, edges, thin = run_detector(frame, params)
+def _edges_of(frame: Frame, params: ScanLineParams, selection: Selection) -> EdgeResults:
+    strength, edges, thin = run_detector(frame, params, selection)
     return EdgeResults(frame, strength, measure_points(frame, params), edges, thin, distanceTransform(thin))
 
 
@@ -98,8 +98,8 @@ class RegionResults(NamedTuple):
 @takes({**DETECTION, **Growing.options})
 def find_regions(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> RegionResults:
     """What `segmentRegionsWithStats` returns, with all that it computes on the way."""
-    params, growing = parsed(options, ScanLineParams, Growing)
-    found = _edges_of(measured_frame(src, params, mask), params)
+    params, selection, growing = parsed(options, ScanLineParams, Selection, Growing)
+    found = _edges_of(measured_frame(src, params, mask), params, selection)
     seeds, labels = seeded_regions(found.frame, found.thin, growing)
     _, _, stats, _, surfaces = described_regions(found.frame, labels)
     return RegionResults(found, seeds, labels, stats, surfaces)

@@ -179,6 +179,7 @@ def evaluateEdges(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge.evaluation import TRUTH_CONVEX, evaluateEdges
     >>> truth = np.zeros((20, 20), np.uint8)
     >>> truth[:, 10] = TRUTH_CONVEX
     >>> edges = np.zeros((20, 20), np.uint8)
@@ -271,6 +272,7 @@ def prattFOM(edges: np.ndarray, truth: np.ndarray, alpha: float = 1 / 9) -> floa
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge.evaluation import prattFOM
     >>> truth = np.zeros((8, 8), np.uint8)
     >>> truth[:, 3] = 255
     >>> prattFOM(truth, truth), round(prattFOM(np.roll(truth, 1, axis=1), truth), 6)
@@ -323,6 +325,7 @@ def baddeleyDelta(edges: np.ndarray, truth: np.ndarray, k: float = 2.0, cutoff: 
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge.evaluation import baddeleyDelta
     >>> truth = np.zeros((8, 8), np.uint8)
     >>> truth[:, 3] = 255
     >>> baddeleyDelta(truth, truth), baddeleyDelta(np.roll(truth, 1, axis=1), truth, cutoff=4)

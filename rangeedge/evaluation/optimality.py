@@ -81,6 +81,7 @@ def geodesicDome(frequency: int, maxSlant: float = 180.0) -> np.ndarray:
 
     Examples
     --------
+    >>> from rangeedge.optimality import geodesicDome
     >>> geodesicDome(4).shape, geodesicDome(4, maxSlant=70).shape
     ((320, 3), (102, 3))
     """
@@ -125,6 +126,7 @@ def creaseAngle(normals1: np.ndarray, normals2: np.ndarray) -> np.ndarray:
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge.optimality import creaseAngle
     >>> float(creaseAngle(np.array([1.0, 0, 1]), np.array([-1.0, 0, 1])).round(9))
     90.0
     """
@@ -158,6 +160,7 @@ def directionalAngles(normals1: np.ndarray, normals2: np.ndarray) -> np.ndarray:
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge.optimality import directionalAngles
     >>> directionalAngles(np.array([1.0, 0, 1]), np.array([-1.0, 0, 1])).round(2)
     array([90.  ,  0.  , 70.53, 70.53])
     """
@@ -195,6 +198,8 @@ def estimationError(normals1: np.ndarray, normals2: np.ndarray, crease: int = CR
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import CREASE_NORMAL
+    >>> from rangeedge.optimality import estimationError
     >>> roof = np.array([1.0, 0.5, 1]), np.array([-1.0, 0.5, 1])
     >>> estimationError(*roof).round(2), abs(estimationError(*roof, CREASE_NORMAL)) < 1e-9
     (np.float64(6.38), np.True_)
@@ -227,6 +232,7 @@ def errorStatistics(errors: np.ndarray) -> ErrorStatistics:
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge.optimality import errorStatistics
     >>> print(errorStatistics(np.array([3.0, -1.0, np.nan])))
     |E| 2.00 ± 1.00, largest 3, bias +1.00, over-estimated 50 %
     """
@@ -263,6 +269,7 @@ def analyseOptimality(frequency: int = 32, crease: int = CREASE_MAX) -> Optimali
 
     Examples
     --------
+    >>> from rangeedge.optimality import analyseOptimality
     >>> print(analyseOptimality(8).statistics)
     |E| 6.41 ± 7.60, largest 47, bias +5.99, over-estimated 80 %
     """

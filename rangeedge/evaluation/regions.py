@@ -82,6 +82,7 @@ def hooverScores(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge.evaluation import hooverScores
     >>> truth = np.repeat([1, 1, 1, 1, 2, 2, 2, 2], 8).reshape(8, 8)
     >>> labels = np.repeat([1, 1, 5, 5, 7, 7, 7, 7], 8).reshape(8, 8)
     >>> print(hooverScores(labels, truth))

@@ -72,6 +72,8 @@ def abwPoints(code: np.ndarray, calibration: int = 2) -> np.ndarray:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge.io.calibration import abwPoints
     >>> abwPoints(np.full((512, 512), 255, np.uint8))[255, 255]
     array([   0.    ,    0.    , 1093.1143], dtype=float32)
     """
@@ -114,6 +116,8 @@ def perceptronPoints(code: np.ndarray) -> np.ndarray:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge.io.calibration import perceptronPoints
     >>> points = perceptronPoints(np.full((512, 512), 1000, np.uint16))
     >>> bool(points[0, 0, 0] < 0 < points[0, 511, 0] and points[0, 0, 1] < 0 < points[511, 0, 1])
     True

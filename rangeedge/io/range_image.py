@@ -84,7 +84,10 @@ def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None)
 
     Examples
     --------
+    >>> import os
     >>> import tempfile
+    >>> import numpy as np
+    >>> from rangeedge import imreadRange, imwriteRange
     >>> path = os.path.join(tempfile.mkdtemp(), "plane.npz")
     >>> imwriteRange(path, np.full((480, 640), 1500, np.uint16), K=[[525, 0, 320], [0, 525, 240], [0, 0, 1]])
     True
@@ -161,7 +164,10 @@ def imwriteRange(
 
     Examples
     --------
+    >>> import os
     >>> import tempfile
+    >>> import numpy as np
+    >>> from rangeedge import imwriteRange
     >>> imwriteRange(os.path.join(tempfile.mkdtemp(), "plane.png"), np.full((4, 5), 1500, np.uint16))
     True
     """

@@ -87,6 +87,7 @@ class Rendering:
         kind.ravel()[far] |= EDGE_OCCLUDED
         return kind
 
+    @_check.public
     def edges(self, jumpThreshold: float, creaseThreshold: float) -> np.ndarray:
         """The edges stronger than two thresholds, marked on both sides.
 
