@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .range_image import RangeImage
-from .source import expect_size, expect_unpacked
+from .source import FILE_LIMIT, expect_size, expect_unpacked
 
 _SOURCES = ("src", "xyz", "points", "depth", "z")
 _GEOMETRY_BYTES = 4096  # more than any geometry takes
@@ -49,23 +49,35 @@ def write_npy(src: np.ndarray) -> bytes:
 
 def read_npz(data: bytes) -> RangeImage:
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
-        arrays = {name.removesuffix(".npy"): name for name in archive.namelist() if name.endswith(".npy")}
-        geometry = {key: arrays.pop(key) for key in _GEOMETRY if key in arrays}
-        found = [key for key in _SOURCES if key in arrays] or list(arrays)
-        if not found or (len(arrays) > 1 and found == list(arrays) and found[0] not in _SOURCES):
-            raise ValueError(f"none of its arrays ({', '.join(arrays)}) is named {', '.join(_SOURCES)}")
-
-        def member(name: str) -> np.ndarray:
-            with archive.open(name) as packed:
-                return read_npy(packed.read(archive.getinfo(name).file_size))
-
-        for name in geometry.values():
-            if archive.getinfo(name).file_size > _GEOMETRY_BYTES:
-                raise ValueError(f"{name} has {archive.getinfo(name).file_size} bytes, no geometry")
-        expect_unpacked(archive.getinfo(arrays[found[0]]).file_size, len(data))
+        members = _members(archive)
+        geometry = {key: members.pop(key) for key in _GEOMETRY if key in members}
+        named = [key for key in _SOURCES if key in members]
+        if not named and len(members) != 1:
+            raise ValueError(f"none of its arrays ({', '.join(members)}) is named {', '.join(_SOURCES)}")
+        src = members[named[0]] if named else next(iter(members.values()))
+        expect_unpacked(src.file_size, len(data))
         return RangeImage(
-            member(arrays[found[0]]), {key: _GEOMETRY[key](member(name)) for key, name in geometry.items()}
+            _member(archive, src, FILE_LIMIT),
+            {key: _GEOMETRY[key](_member(archive, member, _GEOMETRY_BYTES)) for key, member in geometry.items()},
         )
+
+
+def arrays_of_npz(data: bytes, limit: int) -> dict[str, np.ndarray]:
+    """All arrays of at most `limit` bytes each."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return {name: _member(archive, member, limit) for name, member in _members(archive).items()}
+
+
+def _members(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
+    """The arrays of an archive by their names."""
+    return {m.filename.removesuffix(".npy"): m for m in archive.infolist() if m.filename.endswith(".npy")}
+
+
+def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, limit: int) -> np.ndarray:
+    if member.file_size > limit:
+        raise ValueError(f"{member.filename} has {member.file_size} bytes, more than the {limit} that are read of it")
+    with archive.open(member) as packed:
+        return read_npy(packed.read(member.file_size))
 
 
 # What an array in an NPZ file stands for.
