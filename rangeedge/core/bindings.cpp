@@ -5,9 +5,11 @@
 void bind_edges(nanobind::module_& m);
 void bind_distance(nanobind::module_& m);
 void bind_regions(nanobind::module_& m);
+void bind_io(nanobind::module_& m);
 
 NB_MODULE(_core, m) {
     bind_edges(m);
     bind_distance(m);
     bind_regions(m);
+    bind_io(m);
 }

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-import re
+import math
 import struct
+from array import array
+from collections.abc import Iterator
+from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
 
-from .points import UNORGANIZED, points_of, require
+from .points import points_of, unorganized
+from .source import expect_at_least, expect_pixels
+from .text import header_lines, number, words
 
 
 def read_ply(data: bytes) -> np.ndarray:
@@ -30,6 +35,7 @@ def read_ply(data: bytes) -> np.ndarray:
 
     points = points_of(tables["vertex"])
     rows, cols = _ply_size(header, tables, len(points))
+    expect_pixels(rows, cols)
     if "range_grid" not in tables:
         if rows * cols != len(points):
             raise ValueError(f"{rows} rows of {cols} columns do not hold its {len(points)} vertices")
@@ -49,8 +55,8 @@ def read_ply(data: bytes) -> np.ndarray:
 def write_ply(points: np.ndarray) -> bytes:
     """A binary PLY file of (H, W, 3) points with a range_grid, as Stanford's scans have it."""
     height, width = points.shape[:2]
-    valid = np.isfinite(points[..., :3]).all(axis=-1).ravel()
-    vertices = points[..., :3].reshape(-1, 3)[valid].astype("<f4")
+    valid = np.isfinite(points).all(axis=-1).ravel()
+    vertices = points.reshape(-1, 3)[valid].astype("<f4")
     header = (
         f"ply\nformat binary_little_endian 1.0\nobj_info num_cols {width}\nobj_info num_rows {height}\n"
         f"element vertex {len(vertices)}\nproperty float x\nproperty float y\nproperty float z\n"
@@ -98,37 +104,35 @@ class _PlyBody:
         if all(prop.length_type is None for prop in element.properties):
             return self._scalars(element)
         try:
-            firsts = self._firsts(element)
+            firsts = np.array(array("d", self._firsts(element)))
         except (struct.error, IndexError, OverflowError):
             raise ValueError(f"it ends within its element {element.name}") from None
-        columns = np.array(firsts, dtype=np.float64).reshape(element.count, len(element.properties)).T
-        return {prop.name: column for prop, column in zip(element.properties, columns, strict=True)}
+        return _columns(element, firsts)
 
     def _scalars(self, element: _Element) -> dict[str, np.ndarray]:
         layout = np.dtype([(prop.name, self.byte_order + prop.type) for prop in element.properties])
         end = self.at + element.count * layout.itemsize
-        require(self.data, end)
+        expect_at_least(len(self.data), end)
         records = np.ndarray(element.count, layout, self.data, self.at)
         self.at = end
         return {prop.name: records[prop.name] for prop in element.properties}
 
-    def _firsts(self, element: _Element) -> list[float]:
+    def _firsts(self, element: _Element) -> Iterator[float]:
         readers = [
             (self._struct(prop.length_type) if prop.length_type else None, self._struct(prop.type))
             for prop in element.properties
         ]
-        data, at, firsts = self.data, self.at, []
+        data, at = self.data, self.at
         for _ in range(element.count):
             for length_reader, item_reader in readers:
                 length = 1
                 if length_reader is not None:
                     length = _length(length_reader.unpack_from(data, at)[0])
                     at += length_reader.size
-                firsts.append(item_reader.unpack_from(data, at)[0] if length else -1)
+                yield item_reader.unpack_from(data, at)[0] if length else -1
                 at += length * item_reader.size
-        require(data, at)
+        expect_at_least(len(data), at)
         self.at = at
-        return firsts
 
     def _struct(self, kind: str) -> struct.Struct:
         return struct.Struct(self.byte_order + _STRUCT_CODES[kind])
@@ -138,65 +142,74 @@ class _PlyText(_PlyBody):
     """The same of an ascii file, where every value is a word."""
 
     def __init__(self, data: bytes, start: int) -> None:
-        super().__init__(data[start:].split(), 0, "")
+        super().__init__(data, start, "")
+        self._words = chain.from_iterable(words(data, start))
 
     def _scalars(self, element: _Element) -> dict[str, np.ndarray]:
-        width = len(element.properties)
-        end = self.at + element.count * width
-        require(self.data, end, "values")
-        columns = np.array([float(word) for word in self.data[self.at : end]]).reshape(element.count, width).T
-        self.at = end
-        return {prop.name: column for prop, column in zip(element.properties, columns, strict=True)}
+        values = element.count * len(element.properties)
+        expect_at_least((len(self.data) - self.at + 1) // 2, values, "values")
+        found = np.fromiter(map(number, islice(self._words, values)), np.float64)
+        expect_at_least(len(found), values, "values")
+        return _columns(element, found)
 
-    def _firsts(self, element: _Element) -> list[float]:
-        firsts = []
+    def _firsts(self, element: _Element) -> Iterator[float]:
         for _ in range(element.count):
             for prop in element.properties:
-                length = 1
-                if prop.length_type is not None:
-                    length = _length(int(self.data[self.at]))
-                    self.at += 1
-                firsts.append(float(self.data[self.at]) if length else -1)
-                self.at += length
-        require(self.data, self.at, "values")
-        return firsts
+                length = 1 if prop.length_type is None else _length(self._next(element))
+                yield self._next(element) if length else -1
+                for _ in range(length - 1):
+                    self._next(element)
+
+    def _next(self, element: _Element) -> float:
+        word = next(self._words, None)
+        if word is None:
+            raise ValueError(f"it ends within its element {element.name}")
+        return number(word)
+
+
+def _columns(element: _Element, values: np.ndarray) -> dict[str, np.ndarray]:
+    columns = values.reshape(element.count, len(element.properties)).T
+    return {prop.name: column for prop, column in zip(element.properties, columns, strict=True)}
 
 
 def _length(length: float) -> int:
-    if length < 0 or length != int(length):
+    if not 0 <= length < math.inf or length != int(length):
         raise ValueError(f"it has a list of length {length}")
     return int(length)
 
 
 def _ply_header(data: bytes) -> tuple[dict[str, int], list[_Element], _PlyBody]:
     """The sizes named in comments, the elements, and the body."""
-    end = re.search(rb"^end_header[ \t]*\r?\n", data, re.MULTILINE)
-    if end is None:
-        raise ValueError("its header has no end")
     sizes: dict[str, int] = {}
     elements: list[_Element] = []
     encoding = ""
-    for line in data[: end.start()].decode("latin-1").splitlines():
+    for line, end in header_lines(data):
         match line.split():
             case ["format", encoding, _]:
                 pass
             case ["comment" | "obj_info", key, value] if value.isdecimal():
-                sizes[key.lower().rstrip(":=")] = int(value)
+                sizes[key.lower().rstrip(":=")] = int(value[:16])
             case ["element", name, count] if count.isdecimal():
-                elements.append(_Element(name, int(count), []))
+                elements.append(_Element(name, int(count[:16]), []))
             case ["property", "list", length, kind, name] if elements and {length, kind} <= _PLY_TYPES.keys():
                 elements[-1].properties.append(_Property(name, _PLY_TYPES[kind], _PLY_TYPES[length]))
             case ["property", kind, name] if elements and kind in _PLY_TYPES:
                 elements[-1].properties.append(_Property(name, _PLY_TYPES[kind], None))
             case ["ply" | "comment" | "obj_info", *_] | []:
                 pass
+            case ["end_header"]:
+                return sizes, elements, _body(encoding, data, end)
             case _:
                 raise ValueError(f"its header has the line {line[:60]!r}")
+    raise ValueError("its header has no end")
+
+
+def _body(encoding: str, data: bytes, start: int) -> _PlyBody:
     if encoding == "ascii":
-        return sizes, elements, _PlyText(data, end.end())
+        return _PlyText(data, start)
     if encoding not in ("binary_little_endian", "binary_big_endian"):
         raise ValueError(f"unknown format {encoding!r}")
-    return sizes, elements, _PlyBody(data, end.end(), "<" if encoding == "binary_little_endian" else ">")
+    return _PlyBody(data, start, "<" if encoding == "binary_little_endian" else ">")
 
 
 def _ply_size(header: dict[str, int], tables: dict[str, dict[str, np.ndarray]], vertices: int) -> tuple[int, int]:
@@ -209,4 +222,4 @@ def _ply_size(header: dict[str, int], tables: dict[str, dict[str, np.ndarray]], 
         rows, cols = int(view["viewporty"][0]), int(view["viewportx"][0])
         if cols > 1 and rows > 1 and rows * cols == vertices:
             return rows, cols
-    raise ValueError(UNORGANIZED.format("no obj_info num_cols and num_rows, no comment with width and height"))
+    raise unorganized("no obj_info num_cols and num_rows, no comment with width and height")
