@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "regions.hpp"
+#include "regions/regions.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "components.hpp"
+#include "image/components.hpp"
 
 namespace rangeedge {
 namespace {

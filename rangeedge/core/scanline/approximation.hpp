@@ -4,9 +4,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "fit.hpp"
-#include "line.hpp"
-#include "scanline.hpp"
+#include "scanline/fit.hpp"
+#include "scanline/line.hpp"
+#include "scanline/split.hpp"
 
 namespace rangeedge {
 

@@ -8,11 +8,11 @@
 #include <optional>
 #include <type_traits>
 
-#include "edges.hpp"
-#include "noise.hpp"
-#include "scanline.hpp"
-#include "selection.hpp"
-#include "simd.hpp"
+#include "edges/candidate.hpp"
+#include "noise/statistics.hpp"
+#include "scanline/split.hpp"
+#include "edges/select.hpp"
+#include "base/simd.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "geometry.hpp"
+#include "image/frame.hpp"
 
 #include <algorithm>
 #include <limits>
 #include <type_traits>
 #include <vector>
 
-#include "simd.hpp"
+#include "base/simd.hpp"
 
 namespace rangeedge {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "seeds.hpp"
+#include "regions/seeds.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "selection.hpp"
+#include "edges/select.hpp"
 
 #include <algorithm>
 #include <cstddef>
 #include <vector>
 
-#include "components.hpp"
+#include "image/components.hpp"
 
 namespace rangeedge {
 

@@ -7,8 +7,8 @@
 #include <numeric>
 #include <vector>
 
-#include "edges.hpp"
-#include "parallel.hpp"
+#include "edges/candidate.hpp"
+#include "base/parallel.hpp"
 
 namespace rangeedge {
 

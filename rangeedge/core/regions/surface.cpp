@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "surface.hpp"
+#include "regions/surface.hpp"
 
 #include <algorithm>
 #include <cmath>

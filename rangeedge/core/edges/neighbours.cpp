@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "neighbours.hpp"
+#include "edges/neighbours.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <cstddef>
 
-#include "simd.hpp"
+#include "base/simd.hpp"
 
 namespace rangeedge {
 namespace {

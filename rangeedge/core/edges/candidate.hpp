@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "geometry.hpp"
+#include "image/frame.hpp"
 
 namespace rangeedge {
 

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "edges.hpp"
+#include "edges/candidate.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
 
-#include "approximation.hpp"
-#include "line.hpp"
-#include "neighbours.hpp"
-#include "parallel.hpp"
+#include "scanline/approximation.hpp"
+#include "scanline/line.hpp"
+#include "edges/neighbours.hpp"
+#include "base/parallel.hpp"
 
 namespace rangeedge {
 namespace {

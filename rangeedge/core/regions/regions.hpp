@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "surface_image.hpp"
+#include "regions/surface_image.hpp"
 
 namespace rangeedge {
 

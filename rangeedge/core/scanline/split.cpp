@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "scanline.hpp"
+#include "scanline/split.hpp"
 
 #include <cmath>
 #include <type_traits>
 
-#include "simd.hpp"
+#include "base/simd.hpp"
 
 namespace rangeedge {
 namespace {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "line.hpp"
+#include "scanline/line.hpp"
 
 #include <algorithm>
 #include <limits>
 
-#include "simd.hpp"
+#include "base/simd.hpp"
 
 namespace rangeedge {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "fit.hpp"
+#include "scanline/fit.hpp"
 
 #include <algorithm>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "noise.hpp"
+#include "noise/statistics.hpp"
 
 #include <algorithm>
 #include <array>
@@ -11,8 +11,8 @@
 #include <limits>
 #include <utility>
 
-#include "parallel.hpp"
-#include "simd.hpp"
+#include "base/parallel.hpp"
+#include "base/simd.hpp"
 
 namespace rangeedge {
 namespace {

@@ -7,8 +7,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "edges.hpp"
-#include "simd.hpp"
+#include "edges/candidate.hpp"
+#include "base/simd.hpp"
 
 namespace rangeedge {
 

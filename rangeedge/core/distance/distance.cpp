@@ -1,4 +1,4 @@
-#include "distance.hpp"
+#include "distance/distance.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -9,8 +9,8 @@
 #include <numeric>
 #include <vector>
 
-#include "parallel.hpp"
-#include "simd.hpp"
+#include "base/parallel.hpp"
+#include "base/simd.hpp"
 
 namespace rangeedge {
 namespace {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "approximation.hpp"
+#include "scanline/approximation.hpp"
 
 #include <algorithm>
 #include <cmath>
 
-#include "simd.hpp"
+#include "base/simd.hpp"
 
 namespace rangeedge {
 namespace {

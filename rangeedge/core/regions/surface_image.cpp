@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "surface_image.hpp"
+#include "regions/surface_image.hpp"
 
 #include <algorithm>
 #include <limits>

@@ -3,7 +3,7 @@
 
 #include <cstdint>
 
-#include "distance.hpp"
+#include "distance/distance.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

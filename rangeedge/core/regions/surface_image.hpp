@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "surface.hpp"
+#include "regions/surface.hpp"
 
 namespace rangeedge {
 
