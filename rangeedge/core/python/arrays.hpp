@@ -49,7 +49,7 @@ auto handed_over(std::vector<E>&& values) {
         return nb::ndarray<nb::numpy, T, nb::ndim<2>>(owner->data(), {owner->size(), sizeof(E) / sizeof(T)}, capsule);
 }
 
-// A struct of options as a Python class: its fields are keywords of the constructor, all required, and attributes.
+// A struct of options as a Python class: its fields are keywords of the constructor, all required.
 template <class Options, class Type>
 struct Field {
     const char* name;
@@ -62,15 +62,13 @@ Field<Options, Type> field(const char* name, Type Options::* member) {
 
 template <class Options, class... Types>
 void bind_options(nb::module_& m, const char* name, Field<Options, Types>... fields) {
-    nb::class_<Options> bound(m, name);
-    bound.def(
+    nb::class_<Options>(m, name).def(
         "__init__",
         [fields...](Options* self, Types... values) {
             new (self) Options{};
             ((self->*fields.member = values), ...);
         },
         nb::kw_only(), nb::arg(fields.name)...);
-    (bound.def_rw(fields.name, fields.member), ...);
 }
 
 }  // namespace rangeedge::python

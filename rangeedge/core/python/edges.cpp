@@ -31,7 +31,8 @@ std::vector<Candidate> candidates_of(const BoundFrame& bound, const ScanLineOpti
 }
 
 // One array a field, by the field's name.
-nb::dict edge_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads) {
+nb::typed<nb::dict, nb::str, nb::any> edge_candidates(const BoundFrame& frame, const ScanLineOptions& options,
+                                                      int threads) {
     std::vector<Candidate> candidates;
     {
         nb::gil_scoped_release release;

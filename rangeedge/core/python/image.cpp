@@ -19,11 +19,14 @@ void bind_inverse(nb::module_& m) {
         array("depth"), "factor"_a, optional_array("mask"), array("inverse"), Unlocked());
 }
 
+using Numbers = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
+
 template <class T>
 void bind_statistics(nb::module_& m) {
     m.def(
         "noise_statistics",
-        [](const Image<T>& ordinate, int threads) {
+        [](const Image<T>& ordinate,
+           int threads) -> nb::typed<nb::tuple, double, double, double, double, Numbers, Numbers> {
             NoiseStatistics found;
             {
                 nb::gil_scoped_release release;
