@@ -82,16 +82,15 @@ def closeContours(
     params, closing = parsed(options, ScanLineParams, Closing)
     frame = measured_frame(src, params, mask)
     edges = image8("edges", edges, frame.shape)
-    regions = np.empty(frame.shape, np.int32)
-    _core.verified_regions(
-        **surface_map(frame, edges),
-        correlation=frame.kernel_noise[3],
+    kernel_options = _core.ClosureOptions(
+        correlation=frame.correlation,
         tolerance=closing.tolerance,
         share=closing.share,
         dilations=(closing.maxGap + 1) // 2,
         min_area=closing.minArea,
-        regions=regions,
     )
+    regions = np.empty(frame.shape, np.int32)
+    _core.verified_regions(surface_map(frame, edges), kernel_options, regions)
     closed = ((edges != 0) | _meetings(regions)).view(np.uint8) * np.uint8(255)
     return deliver("dst", closed, dst)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import cv2
 import numpy as np
@@ -25,14 +25,6 @@ if TYPE_CHECKING:
     from ._typed import DetectionOptions, RefinementOptions
 
 _OWN: Any = ...  # of an argument left out: the detector's own value
-
-
-class Detection(NamedTuple):
-    """What `detectEdges` computes on the way."""
-
-    strength: EdgeStrength
-    selected: np.ndarray
-    thin: np.ndarray
 
 
 @takes(DETECTION)
@@ -100,7 +92,7 @@ def detectEdges(
     """
     given = {"jumpThreshold": jumpThreshold, "creaseThreshold": creaseThreshold, "eps": eps, **options}
     params, selection = parsed(given, ScanLineParams, Selection)
-    return deliver("edges", run_detector(measured_frame(src, params, mask), params, selection).thin, edges)
+    return deliver("edges", run_detector(measured_frame(src, params, mask), params, selection)[0], edges)
 
 
 @takes(DETECTION)
@@ -153,15 +145,13 @@ def detectEdgesWithStrength(
     """
     given = {"jumpThreshold": jumpThreshold, "creaseThreshold": creaseThreshold, "eps": eps, **options}
     params, selection = parsed(given, ScanLineParams, Selection)
-    found = run_detector(measured_frame(src, params, mask), params, selection)
-    return found.thin, found.strength
+    return run_detector(measured_frame(src, params, mask), params, selection)
 
 
-def run_detector(frame: Frame, params: ScanLineParams, selection: Selection) -> Detection:
+def run_detector(frame: Frame, params: ScanLineParams, selection: Selection) -> tuple[np.ndarray, EdgeStrength]:
     """The edges of a checked range image: strengths, those of them that count, and their middle lines."""
     strength = measure_strength(frame, params)
-    selected = select_strength(strength, selection)
-    return Detection(strength, selected, thinEdges(selected))
+    return thinEdges(select_strength(strength, selection)), strength
 
 
 @public
@@ -290,7 +280,7 @@ class ScanLineDetector(Accessors):
         thresholds = {"jumpThreshold": jumpThreshold, "creaseThreshold": creaseThreshold}
         given = {name: value for name, value in thresholds.items() if value is not _OWN}
         params, selection = self._params, replace(self._selection, **given, **options)
-        return deliver("edges", run_detector(measured_frame(src, params, mask), params, selection).thin, edges)
+        return deliver("edges", run_detector(measured_frame(src, params, mask), params, selection)[0], edges)
 
     def clear(self) -> None:
         """Give every parameter its default again.

@@ -267,13 +267,23 @@ def edgePoints(
 def measure_strength(frame: Frame, params: ScanLineParams) -> EdgeStrength:
     """Edge strengths of a checked range image."""
     strength = _no_strength(frame.shape)
-    _core.edge_strength(*frame.kernel, _kernel_parameters(params, frame), *strength)
+    _core.edge_strength(frame.kernel, _kernel_options(params), frame.threads, *strength)
     return strength
 
 
 def measure_points(frame: Frame, params: ScanLineParams) -> np.ndarray:
     """Edge points of a checked range image."""
-    candidates = _core.edge_candidates(*frame.kernel, _kernel_parameters(params, frame))
+    return _points(_core.edge_candidates(frame.kernel, _kernel_options(params), frame.threads))
+
+
+def measure_both(frame: Frame, params: ScanLineParams) -> tuple[EdgeStrength, np.ndarray]:
+    """Edge strengths and edge points of a checked range image, of one approximation of its scan lines."""
+    strength = _no_strength(frame.shape)
+    found = _core.edge_strength_and_candidates(frame.kernel, _kernel_options(params), frame.threads, *strength)
+    return strength, _points(found)
+
+
+def _points(candidates: dict[str, np.ndarray]) -> np.ndarray:
     points = np.empty(len(candidates["x"]), dtype=_POINT)
     for name in points.dtype.names:
         points[name] = candidates[name]
@@ -288,11 +298,11 @@ def _no_strength(shape: tuple[int, int]) -> EdgeStrength:
     return EdgeStrength(floats[0], floats[1], maps[12 * size :].reshape(shape), floats[2])
 
 
-def _kernel_parameters(params: ScanLineParams, frame: Frame) -> _core.Parameters:
+def _kernel_options(params: ScanLineParams) -> _core.ScanLineOptions:
     """The options of scan lines under their names in the kernel."""
     options = [option for option in ScanLineParams.options.values() if option.group == "scan lines"]
     values = {_kernel_name(option): _kernel_value(option, getattr(params, option.name)) for option in options}
-    return _core.Parameters(**values, threads=frame.threads)
+    return _core.ScanLineOptions(**values)
 
 
 def _kernel_name(option: Option) -> str:

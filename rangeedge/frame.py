@@ -5,7 +5,6 @@ from __future__ import annotations
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import cv2
 import numpy as np
@@ -104,18 +103,19 @@ class Frame:
         object.__setattr__(measured, "noise", noise)
         return measured
 
-    @cached_property
-    def kernel(self) -> tuple[Any, ...]:
-        """The image as the kernels on scan lines take it."""
-        a, b, c, correlation, sigmas = self.kernel_noise
-        return self.samples, self.projective, self.to_plane, self.axis, (a, b, c, correlation), sigmas
-
     @property
-    def kernel_noise(self) -> tuple[Any, ...]:
-        """The noise as the kernels take it."""
+    def correlation(self) -> float:
+        """How much larger the noise is over several pixels than between neighbours."""
+        return 1.0 if isinstance(self.noise, np.ndarray) else self.noise.correlation
+
+    @cached_property
+    def kernel(self) -> _core.Frame:
+        """The image with its noise as every kernel takes it."""
         if isinstance(self.noise, np.ndarray):
-            return 0.0, 0.0, 0.0, 1.0, self.noise
-        return self.noise.a, self.noise.b, self.noise.c, self.noise.correlation, None
+            noise = _core.Noise(0.0, 0.0, 0.0, 1.0, self.noise)
+        else:
+            noise = _core.Noise(self.noise.a, self.noise.b, self.noise.c, self.noise.correlation)
+        return _core.Frame(self.samples, self.projective, self.to_plane, self.axis, noise)
 
 
 def read_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None = None) -> Frame:

@@ -249,7 +249,7 @@ def _segmented(
 ) -> tuple[Frame, np.ndarray]:
     params, growing = parsed(options, ScanLineParams, Growing)
     frame = measured_frame(src, params, mask)
-    edges = run_detector(frame, params, Selection()).thin if edges is None else image8("edges", edges, frame.shape)
+    edges = run_detector(frame, params, Selection())[0] if edges is None else image8("edges", edges, frame.shape)
     return frame, seeded_regions(frame, edges, growing)[1]
 
 
@@ -261,14 +261,14 @@ def seeded_regions(frame: Frame, edges: np.ndarray, growing: Growing) -> tuple[n
 
 
 def _grow(frame: Frame, markers: np.ndarray, edges: np.ndarray | None, growing: Growing, new_seeds: bool) -> np.ndarray:
-    parameters = _core.RegionParameters(
+    options = _core.RegionOptions(
         tolerance=growing.tolerance,
         smooth_angle=growing.smoothAngle,
         min_area=growing.minArea,
         new_seeds=new_seeds,
     )
     labels = np.empty(frame.shape, np.int32)
-    _core.grow_regions(**surface_map(frame, edges), markers=markers, parameters=parameters, labels=labels)
+    _core.grow_regions(surface_map(frame, edges), markers, options, labels)
     return labels
 
 

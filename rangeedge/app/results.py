@@ -19,14 +19,15 @@ import numpy as np
 
 from .. import __version__
 from .._check import described, error, named
-from ..detector import run_detector
 from ..distance import distanceTransform
 from ..draw import drawOverview, region_overview
-from ..edges import EdgeStrength, measure_points
+from ..edges import EdgeStrength, measure_both
 from ..frame import Frame
 from ..noise import measured_frame
 from ..options import DETECTION, Growing, ScanLineParams, Selection, parsed, takes
 from ..regions import described_regions, seeded_regions
+from ..selection import select_strength
+from ..thinning import thinEdges
 
 _REPORT = "report.json"
 _LABELS = 65535  # that 16 bits hold
@@ -80,8 +81,10 @@ def find_edges(src: np.ndarray, *, mask: np.ndarray | None = None, **options: An
 
 
 def _edges_of(frame: Frame, params: ScanLineParams, selection: Selection) -> EdgeResults:
-    strength, edges, thin = run_detector(frame, params, selection)
-    return EdgeResults(frame, strength, measure_points(frame, params), edges, thin, distanceTransform(thin))
+    strength, points = measure_both(frame, params)
+    edges = select_strength(strength, selection)
+    thin = thinEdges(edges)
+    return EdgeResults(frame, strength, points, edges, thin, distanceTransform(thin))
 
 
 class RegionResults(NamedTuple):
