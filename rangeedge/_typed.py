@@ -102,14 +102,16 @@ class Accessors:
     def getEps(self) -> float | None:
         """getEps() -> retval
 
-        Splitting tolerance as a length, at the pixel's depth with a camera (P§4.1). None: `epsFactor` times the noise.
+        Splitting tolerance as a length, at the pixel's depth with a camera (paper, 4.1). None: `epsFactor` times the
+        noise.
         """
         return self._params.eps
 
     def setEps(self, eps: float | None, /) -> None:
         """setEps(eps) -> None
 
-        Splitting tolerance as a length, at the pixel's depth with a camera (P§4.1). None: `epsFactor` times the noise.
+        Splitting tolerance as a length, at the pixel's depth with a camera (paper, 4.1). None: `epsFactor` times the
+        noise.
         """
         self._set("eps", eps)
 
@@ -245,7 +247,7 @@ class Accessors:
         """getCrease() -> retval
 
         CREASE_NORMAL, the angle between the surface normals, which the tangents of several scan lines give; or
-        CREASE_MAX, the largest directional angle (P§4.2).
+        CREASE_MAX, the largest directional angle (paper, 4.2).
         """
         return self._params.crease
 
@@ -253,21 +255,21 @@ class Accessors:
         """setCrease(crease) -> None
 
         CREASE_NORMAL, the angle between the surface normals, which the tangents of several scan lines give; or
-        CREASE_MAX, the largest directional angle (P§4.2).
+        CREASE_MAX, the largest directional angle (paper, 4.2).
         """
         self._set("crease", crease)
 
     def getMaxShift(self) -> float:
         """getMaxShift() -> retval
 
-        How far the adapted edge position may lie from the cut (P§4.2, Fig. 5); 0 keeps the cut.
+        How far the adapted edge position may lie from the cut (paper, 4.2, Fig. 5); 0 keeps the cut.
         """
         return self._params.maxShift
 
     def setMaxShift(self, maxShift: float, /) -> None:
         """setMaxShift(maxShift) -> None
 
-        How far the adapted edge position may lie from the cut (P§4.2, Fig. 5); 0 keeps the cut.
+        How far the adapted edge position may lie from the cut (paper, 4.2, Fig. 5); 0 keeps the cut.
         """
         self._set("maxShift", maxShift)
 

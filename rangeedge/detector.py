@@ -77,7 +77,7 @@ def detectEdges(
 
     Notes
     -----
-    Jiang and Bunke, sections 4 and 6.
+    Paper, 4 and 6.
 
     Examples
     --------
@@ -131,7 +131,7 @@ def detectEdgesWithStrength(
 
     Notes
     -----
-    Jiang and Bunke, sections 4 and 6.
+    Paper, 4 and 6.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""Edge strengths, kinds and positions from scan line approximation (P§4)."""
+"""Edge strengths, kinds and positions from scan line approximation (paper, 4)."""
 
 from __future__ import annotations
 
@@ -113,7 +113,7 @@ def splitScanLine(z: np.ndarray, eps: float, pixelSize: float | np.ndarray = 1.0
 
     Notes
     -----
-    Jiang and Bunke, section 4.1 and Fig. 3, after Duda and Hart.
+    Paper, 4.1 and Fig. 3, after Duda and Hart.
 
     Examples
     --------
@@ -155,12 +155,12 @@ def edgeStrength(
 
     edgeStrength(src[, eps], *[, mask[, K[, ...]]]) -> jump, crease, kind, significance
 
-    Rows, columns and both diagonals are approximated by curves (P§4.1). At a cut between two of them, f1 and f2,
+    Rows, columns and both diagonals are approximated by curves (paper, 4.1). At a cut between two of them, f1 and f2,
 
         jump = |z1(x) - z2(x)|,  crease = the angle between the normals of f1 and f2 at x,
 
     x being the position of the edge; it is their intersection where the pixels allow that, and then jump = 0
-    (P§4.2). Both pixels beside the cut receive the strengths, and of several candidates the largest.
+    (paper, 4.2). Both pixels beside the cut receive the strengths, and of several candidates the largest.
 
     Parameters
     ----------
@@ -198,7 +198,7 @@ def edgeStrength(
 
     Notes
     -----
-    Jiang and Bunke, sections 4.1 and 4.2. The result does not depend on the number of threads.
+    Paper, 4.1 and 4.2. The result does not depend on the number of threads.
 
     Examples
     --------
@@ -249,7 +249,7 @@ def edgePoints(
 
     Notes
     -----
-    Jiang and Bunke, section 4.2 and Fig. 5. The order is by direction, then by line, then along the line.
+    Paper, 4.2 and Fig. 5. The order is by direction, then by line, then along the line.
 
     Examples
     --------

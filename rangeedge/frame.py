@@ -1,4 +1,4 @@
-"""From a range image in any of its forms to the coordinates in which scan lines are plane curves (P§4.1)."""
+"""From a range image in any of its forms to the coordinates in which scan lines are plane curves (paper, 4.1)."""
 
 from __future__ import annotations
 

@@ -199,7 +199,7 @@ class ScanLineParams(Options):
         None,
         _or_none(_real(0, above=True)),
         "float or None",
-        "Splitting tolerance as a length, at the pixel's depth with a camera (P§4.1). None: `epsFactor` times the"
+        "Splitting tolerance as a length, at the pixel's depth with a camera (paper, 4.1). None: `epsFactor` times the"
         " noise.",
         group="scan lines",
     )
@@ -294,7 +294,7 @@ class ScanLineParams(Options):
         _one_of(CREASES),
         "int",
         "CREASE_NORMAL, the angle between the surface normals, which the tangents of several scan lines give; or"
-        " CREASE_MAX, the largest directional angle (P§4.2).",
+        " CREASE_MAX, the largest directional angle (paper, 4.2).",
         group="scan lines",
         choices={"max": CREASE_MAX, "normal": CREASE_NORMAL},
         constants=CREASES,
@@ -304,7 +304,7 @@ class ScanLineParams(Options):
         4.0,
         _real(0),
         "float",
-        "How far the adapted edge position may lie from the cut (P§4.2, Fig. 5); 0 keeps the cut.",
+        "How far the adapted edge position may lie from the cut (paper, 4.2, Fig. 5); 0 keeps the cut.",
         unit="pixels",
         group="scan lines",
     )

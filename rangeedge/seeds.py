@@ -1,4 +1,4 @@
-"""Seeds: compact markers in the middle of surfaces, far from every edge (P§7)."""
+"""Seeds: compact markers in the middle of surfaces, far from every edge (paper, 7)."""
 
 from __future__ import annotations
 

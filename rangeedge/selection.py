@@ -53,7 +53,7 @@ def strengthImage(strength: np.ndarray, cut: float, dst: np.ndarray | None = Non
 
     Notes
     -----
-    Jiang and Bunke, section 6. Level 80 of a crease image is 20 degrees, level 120 is 30 degrees.
+    Paper, 6. Level 80 of a crease image is 20 degrees, level 120 is 30 degrees.
 
     Examples
     --------
@@ -99,7 +99,7 @@ def overallStrength(
 
     Notes
     -----
-    Jiang and Bunke, section 6.
+    Paper, 6.
 
     Examples
     --------
@@ -197,7 +197,7 @@ def selectEdges(*args: Any, **options: Any) -> np.ndarray:
 
     Notes
     -----
-    Thresholds after Jiang and Bunke, section 6: 20 degrees for quiet scanners, 30 for noisy ones.
+    Thresholds as in the paper, 6: 20 degrees for quiet scanners, 30 for noisy ones.
 
     The dynamic threshold is that of Venkatesh and Rosin (1995), for either type of edge by itself: the
     candidates (positive strength) are thinned and cut at junctions into chains of length L and mean
@@ -301,7 +301,7 @@ def _unfrayed(crease: np.ndarray, least: float) -> np.ndarray:
 
 
 def _grey_levels(strength: np.ndarray, cut: float) -> np.ndarray:
-    """P§6, at the edge pixels only; in double precision, so that a strength of exactly one level stays there."""
+    """Paper, 6, at the edge pixels only; in double precision, so that a strength of exactly one level stays there."""
     levels = np.zeros(strength.shape, np.uint8)
     edge = strength > 0
     levels[edge] = np.minimum(np.ceil(255 * strength[edge].astype(np.float64) / cut), 255)
@@ -344,7 +344,7 @@ def _pixels_of(edges: np.ndarray, labels: np.ndarray, keep: np.ndarray) -> np.nd
 
 
 def _outstanding(strength: np.ndarray) -> np.ndarray:
-    """Where the nearest chain of candidates passes the threshold of Venkatesh and Rosin (L§6)."""
+    """Where the nearest chain of candidates passes the threshold of Venkatesh and Rosin."""
     candidates = strength > 0
     if not candidates.any():
         return candidates

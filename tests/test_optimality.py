@@ -1,4 +1,4 @@
-"""The simulation of P§5: the dome, planes by hand, the paper's figures, the detector itself."""
+"""The simulation of the paper, 5: the dome, planes by hand, the paper's figures, the detector itself."""
 
 import numpy as np
 import pytest

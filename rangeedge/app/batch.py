@@ -127,11 +127,7 @@ def detect_file(path: str, folder: Path, options: dict[str, Any]) -> EdgeResults
 def read_image(path: str, options: dict[str, Any]) -> RangeImage:
     """An image of which `geometry` holds all options; a geometry among these replaces that of the file."""
     options = dict(options)
-    image = imreadRange(path, calibration=options.pop("calibration", None))
-    known = image.geometry
-    if "K" in options or "pixelSize" in options:
-        known = {name: value for name, value in known.items() if name == "depthFactor"}
-    return RangeImage(image.src, {**known, **options})
+    return imreadRange(path, calibration=options.pop("calibration", None)).withGeometry(**options)
 
 
 def _is_done(path: str, folder: Path, options: dict[str, Any]) -> bool:

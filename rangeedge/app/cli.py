@@ -266,7 +266,7 @@ def _batch(args: argparse.Namespace) -> int:
 def _demo(args: argparse.Namespace) -> int:
     from . import demo
 
-    scene = demo.real_scene() if args.real else demo.rendered_scene()
+    scene = demo.RealScene() if args.real else demo.RenderedScene()
     options = _options(args)
     found = find_edges(scene.src, **scene.geometry, **options)
     files = {**edge_files(found, scene.title, options), **scene.files(found)}
@@ -281,13 +281,13 @@ def _demo(args: argparse.Namespace) -> int:
 @named("bench")
 def _bench(args: argparse.Namespace) -> int:
     from .bench import benchmark, table
-    from .demo import rendered_scene
+    from .demo import RenderedScene
 
     options = _options(args)
     if args.image is None and options:
         given = " ".join(map(_flag, options))
         raise error(f"{given} describes an IMAGE, but there is none; the built-in scene has its own")
-    image = rendered_scene() if args.image is None else read_image(args.image, options)
+    image = RenderedScene() if args.image is None else read_image(args.image, options)
     times = benchmark(image.src, repeat=args.repeat, **image.geometry)
     print(json.dumps(times, indent=2) if args.json else table(times))
     return 0

@@ -229,10 +229,7 @@ def write_folder(out: str | os.PathLike[str], files: Mapping[str, bytes]) -> Non
                 (stage / name).write_bytes(data)
             if out.exists():
                 (out / _REPORT).unlink(missing_ok=True)
-                for name in (
-                    *(name for name in files if name != _REPORT),
-                    *(name for name in files if name == _REPORT),
-                ):
+                for name in sorted(files, key=lambda name: name == _REPORT):  # the report comes last
                     os.replace(stage / name, out / name)
             else:
                 out.absolute().parent.mkdir(parents=True, exist_ok=True)

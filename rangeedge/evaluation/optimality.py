@@ -1,4 +1,4 @@
-"""How near the strength of a crease edge comes to the true angle: the simulation of P§5, and the detector itself."""
+"""How near the strength of a crease edge comes to the true angle: the simulation of the paper, 5, and the detector itself."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .. import _check
 from ..constants import CREASE_MAX, CREASE_NORMAL
 from ..edges import edgeStrength
 
-MAX_SLANT = 70.0  # degrees; steeper planes are rarely seen (P§5)
+MAX_SLANT = 70.0  # degrees; steeper planes are rarely seen (paper, 5)
 
 _CREASE = {"CREASE_MAX": CREASE_MAX, "CREASE_NORMAL": CREASE_NORMAL}
 # Unit directions (x, y) in the image of rows, columns and the two diagonals.
@@ -60,7 +60,7 @@ def geodesicDome(frequency: int, maxSlant: float = 180.0) -> np.ndarray:
     geodesicDome(frequency[, maxSlant]) -> directions
 
     Every edge of the icosahedron is divided into f equal parts, which makes f^2 triangles of each of its 20 faces;
-    their centres are projected onto the unit sphere (P§5).
+    their centres are projected onto the unit sphere (paper, 5).
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def creaseAngle(normals1: np.ndarray, normals2: np.ndarray) -> np.ndarray:
 
     creaseAngle(normals1, normals2) -> angles
 
-    Formula (1) of P§2, in degrees; accurate for the smallest and the largest angles too.
+    Paper, 2, formula 1, in degrees; accurate for the smallest and the largest angles too.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def directionalAngles(normals1: np.ndarray, normals2: np.ndarray) -> np.ndarray:
     directionalAngles(normals1, normals2) -> angles
 
     The section along the unit image direction d shows the plane (a, b, c) as a line of slope -(a dx + b dy) / c;
-    its strength is the angle between the two lines (P§4.2), in degrees.
+    its strength is the angle between the two lines (paper, 4.2), in degrees.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def estimationError(normals1: np.ndarray, normals2: np.ndarray, crease: int = CR
 
     estimationError(normals1, normals2[, crease]) -> errors
 
-    E = combined strength - true angle (P§5). `CREASE_MAX` combines as the paper does: the largest of
+    E = combined strength - true angle (paper, 5). `CREASE_MAX` combines as the paper does: the largest of
     `directionalAngles`. `CREASE_NORMAL` takes the tangents of both planes in the two sections with the largest angles;
     their cross products are the normals, so that E is 0 but for rounding.
 
@@ -244,7 +244,7 @@ def errorStatistics(errors: np.ndarray) -> ErrorStatistics:
 
 @_check.public
 def analyseOptimality(frequency: int = 32, crease: int = CREASE_MAX) -> OptimalityAnalysis:
-    """Estimation errors of all pairs of plane orientations: the simulation of P§5.
+    """Estimation errors of all pairs of plane orientations: the simulation of the paper, 5.
 
     analyseOptimality([frequency[, crease]]) -> OptimalityAnalysis
 

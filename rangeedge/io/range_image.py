@@ -45,6 +45,18 @@ class RangeImage(_SourceAndGeometry):
         image.georeference = georeference
         return image
 
+    def withGeometry(self, **given: Any) -> RangeImage:
+        """The same image with a geometry that replaces what the file knows.
+
+        withGeometry(*[, K[, pixelSize[, heightMap[, depthFactor]]]]) -> image
+
+        A camera or a grid replaces all but the factor of the depths.
+        """
+        known = self.geometry
+        if "K" in given or "pixelSize" in given:
+            known = {name: value for name, value in known.items() if name == "depthFactor"}
+        return self._replace(geometry={**known, **given})
+
     def _replace(self, **changes: Any) -> RangeImage:  # type: ignore[override]
         kept = {"src": self.src, "geometry": self.geometry, **vars(self)}
         return RangeImage(**{**kept, **changes})

@@ -53,7 +53,7 @@ class Rendering:
         faces meet; the `crease`, the angle between both normals in degrees; whether it is `convex`; whether `first` is
         the `nearer`; the `direction`, one of DIR_*.
     jump, crease
-        (H, W) float32: the largest jump, and the largest crease between faces that meet (P§2), at either side.
+        (H, W) float32: the largest jump, and the largest crease between faces that meet (paper, 2), at either side.
     kind
         (H, W) uint8: bits EDGE_*, as `edgeStrength` returns them; convex or concave is that of the largest crease.
     """
@@ -131,7 +131,7 @@ def renderScene(scene: Sequence[Solid], camera: Camera) -> Rendering:
     Between two neighbouring pixels (8-neighbours) on different faces the place where the visible face changes is found
     by bisection on the faces themselves. Both surfaces are intersected with the line of sight there, extended beyond
     the border of the face where need be: the difference of the depths is the jump, the angle between the normals the
-    crease, as the paper defines them (P§2, Fig. 2). Solids are convex, so no face occludes itself.
+    crease, as the paper defines them (paper, 2, Fig. 2). Solids are convex, so no face occludes itself.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def _crossings(every: Sequence[Face], camera: Camera, depth: np.ndarray, faces: 
         is_first = np.isfinite(depth_first) & (depth_first <= hits(1, rays))
         low, high = np.where(is_first, middle, low), np.where(is_first, high, middle)
 
-    # Both surfaces on the line of sight where the view changes from one to the other (P§2: x0, f1 and f2).
+    # Both surfaces on the line of sight where the view changes from one to the other (paper, 2: x0, f1 and f2).
     place = (low + high) / 2
     origins, directions = rays_at(place)
     ahead = [

@@ -110,7 +110,7 @@ def _across(orientation: Any) -> np.ndarray:
 
 @_check.public
 def twoCylinders(angle: float = 36.3, radius: float = 0.1, distance: float = 1.0) -> list[Solid]:
-    """Two parallel upright cylinders that meet in a concave crease of `angle` degrees (P§4.1, Fig. 3 and Table 2).
+    """Two parallel upright cylinders that meet in a concave crease of `angle` degrees (paper, 4.1, Fig. 3 and Table 2).
 
     twoCylinders([angle[, radius[, distance]]]) -> scene
 
