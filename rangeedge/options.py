@@ -8,7 +8,6 @@ flags of the command line, and what a detector saves: every field of `ScanLinePa
 
 from __future__ import annotations
 
-import difflib
 import functools
 import inspect
 import textwrap
@@ -58,6 +57,7 @@ class Option:
     name: str = ""
     annotation: str = ""
 
+    @functools.cached_property
     def documented(self) -> str:
         """The entry of the option in a numpydoc section."""
         text = textwrap.fill(self.text, 112, break_on_hyphens=False)
@@ -158,7 +158,7 @@ def _with_options(doc: str | None, options: Collection[Option]) -> str | None:
     """A docstring with the entries of the options where it says {options}."""
     if doc is None:
         return None
-    return doc.replace("    {options}", textwrap.indent("\n".join(own.documented() for own in options), "    "))
+    return doc.replace("    {options}", textwrap.indent("\n".join(own.documented for own in options), "    "))
 
 
 FITS = {"FIT_LSQ": FIT_LSQ, "FIT_INTERP": FIT_INTERP}
@@ -516,8 +516,7 @@ def takes(options: Mapping[str, Option], **shown_default: Any) -> Callable[[_Fun
         def call(*args: Any, **kwargs: Any) -> Any:
             for name in kwargs:
                 if name not in allowed:
-                    close = difflib.get_close_matches(name, allowed, 1)
-                    raise _check.error(f"unknown argument `{name}`{f'; did you mean `{close[0]}`?' if close else ''}")
+                    raise _unknown(name, allowed)
             return function(*args, **kwargs)
 
         call.__signature__ = signature.replace(parameters=own + shown)  # type: ignore[attr-defined]
@@ -525,6 +524,13 @@ def takes(options: Mapping[str, Option], **shown_default: Any) -> Callable[[_Fun
         return call  # type: ignore[return-value]
 
     return taking
+
+
+def _unknown(name: str, allowed: Collection[str]) -> _check.error:
+    from difflib import get_close_matches
+
+    close = get_close_matches(name, allowed, 1)
+    return _check.error(f"unknown argument `{name}`{f'; did you mean `{close[0]}`?' if close else ''}")
 
 
 def parsed(options: Mapping[str, Any], *kinds: type[Options]) -> tuple[Any, ...]:
