@@ -85,13 +85,10 @@ def range_frame(
     inside = None if mask is None else image8(func, "mask", mask, src.shape[:2]) != 0
     if src.ndim == 3:
         return _points(func, src, inside, K, pixelSize, heightMap)
-    if heightMap and src.dtype.kind == "i":
-        expected = "heights as floats (or unsigned integers, 0 for no data) where heightMap is True"
-        raise fail(func, "src", expected, described(src), cv2.Error.StsUnsupportedFormat)
     if K is not None:
         return _pinhole(func, src, depthFactor, inside, camera_matrix(func, "K", K))
     spacing = (1.0, 1.0) if pixelSize is None else pixel_size(func, "pixelSize", pixelSize)
-    frame = _grid(_lengths(func, src, depthFactor), spacing, heightMap)
+    frame = _grid(_lengths(func, src, depthFactor, heightMap), spacing, heightMap)
     if inside is None:
         return frame
     samples = frame.samples.copy() if np.shares_memory(frame.samples, src) else frame.samples
@@ -99,15 +96,18 @@ def range_frame(
     return RangeFrame(samples, frame.projective, frame.to_plane, frame.axis)
 
 
-def _lengths(func: str, src: np.ndarray, depthFactor: float) -> np.ndarray:
-    """Values as float lengths, invalid integers as NaN; float32 and float64 arrays are passed on unchanged."""
+def _lengths(func: str, src: np.ndarray, depthFactor: float, heightMap: bool = False) -> np.ndarray:
+    """Values as float lengths, invalid integers as NaN; float32 and float64 arrays are passed on unchanged.
+
+    Depths of 0 or less are invalid. Heights may be negative: among signed ones only the least of the type is invalid.
+    """
     if src.dtype.kind == "f":
         return np.ascontiguousarray(src, dtype=np.float64 if src.dtype.itemsize > 4 else np.float32)
     if src.dtype.kind == "b":
         raise fail(func, "src", SRC + " of numbers", described(src), cv2.Error.StsUnsupportedFormat)
     real = np.float32 if src.dtype.itemsize <= 2 else np.float64
     lengths = np.divide(src, real(depthFactor), dtype=real, order="C")
-    lengths[src <= 0] = np.nan
+    lengths[src <= (np.iinfo(src.dtype).min if heightMap else 0)] = np.nan
     return lengths
 
 

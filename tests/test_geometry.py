@@ -284,9 +284,18 @@ def test_points_left_out_do_not_turn_the_viewing_axis():
         assert edgeStrength(src, noise=0.001, mask=inside).jump.max() == pytest.approx(expected, rel=1e-6)
 
 
-def test_masked_arrays_and_whole_heights_are_refused():
+def test_masked_arrays_are_refused():
     heights = np.ma.masked_equal(np.arange(400.0).reshape(20, 20), 7)
     with pytest.raises(rangeedge.error, match=r"edgeStrength: `src` must be .* got a masked array"):
         edgeStrength(heights, heightMap=True)
-    with pytest.raises(rangeedge.error, match="edgeStrength: `src` must be heights as floats"):
-        edgeStrength(np.arange(400, dtype=np.int16).reshape(20, 20), heightMap=True)
+
+
+def test_whole_heights_may_be_negative():
+    heights = np.arange(-200, 200, dtype=np.int16).reshape(20, 20)
+    heights[3, 4] = -32768
+    frame = range_frame("f", heights, heightMap=True, depthFactor=10.0)
+    assert frame.valid.sum() == 399
+    assert frame.valid[3, 4] == 0
+    np.testing.assert_array_equal(frame.ordinate[0], np.float32(heights[0] / 10))
+    assert range_frame("f", heights).valid.sum() == 199
+    assert range_frame("f", heights.clip(0).astype(np.uint16), heightMap=True).valid.sum() == 199

@@ -13,7 +13,7 @@ import numpy as np
 from .source import HEADER_LIMIT, expect_at_least, expect_pixels, expect_unpacked
 from .text import numbers
 
-_PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}  # by colour type: grey, colours, palette, grey and colours with opacity
+_PNG_COLOURS = {0: "grey values", 2: "colours", 3: "a palette", 4: "opacity", 6: "colours"}  # by colour type
 
 
 def read_png(data: bytes) -> np.ndarray:
@@ -29,11 +29,12 @@ def read_png(data: bytes) -> np.ndarray:
         at += 12 + length
     width, height = int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
     bits, colour = data[24], data[25]
-    if data[12:16] != b"IHDR" or bits not in (1, 2, 4, 8, 16) or colour not in _PNG_CHANNELS:
+    if data[12:16] != b"IHDR" or bits not in (1, 2, 4, 8, 16) or colour not in _PNG_COLOURS:
         raise ValueError("its header is garbled")
-    if colour != 0 or bits != 16:
-        what = "colours" if colour in (2, 3, 6) else f"{bits} bits" if bits < 16 else "opacity"
-        raise ValueError(f"it holds {what}; a range image is a PNG of one channel of 16 bits")
+    if colour != 0:
+        raise ValueError(f"it holds {_PNG_COLOURS[colour]}, no range image, which is a PNG of one channel of 16 bits")
+    if bits != 16:
+        raise ValueError(f"it holds {bits} bits (8 bits are too coarse for edges); a range image is a PNG of 16 bits")
     expect_pixels(height, width)
     expect_unpacked(2 * width * height, len(data))
     with _quiet():
@@ -85,7 +86,7 @@ def read_pgm(data: bytes) -> np.ndarray:
     if not 0 < top < 65536:
         raise ValueError(f"its largest value {top} is not from 1 to 65535")
     if top < 256:
-        raise ValueError("it holds 8 bits, too coarse for edges; a range image is a PGM with 16 bits")
+        raise ValueError("it holds 8 bits (8 bits are too coarse for edges); a range image is a PGM of 16 bits")
     if magic == b"P2":
         values = numbers(data, start, width * height)
     else:
