@@ -7,6 +7,7 @@
 
 #include "io/lzf.hpp"
 #include "io/lzw.hpp"
+#include "io/png.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;
@@ -24,10 +25,17 @@ std::size_t lzw_unpack(const Bytes<const std::uint8_t>& packed, const Bytes<std:
     return rangeedge::lzw_unpack(packed.data(), packed.shape(0), out.data(), out.shape(0));
 }
 
+bool png_unfilter(const Bytes<const std::uint8_t>& filtered, std::size_t pixel_bytes,
+                  const nb::ndarray<std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>& out) {
+    return rangeedge::png_unfilter(filtered.data(), out.shape(0), out.shape(1), pixel_bytes, out.data());
+}
+
 }  // namespace
 
 void bind_io(nb::module_& m) {
     m.def("lzf_unpack", &lzf_unpack, "packed"_a.noconvert(), "out"_a.noconvert(),
+          nb::call_guard<nb::gil_scoped_release>());
+    m.def("png_unfilter", &png_unfilter, "filtered"_a.noconvert(), "pixel_bytes"_a, "out"_a.noconvert(),
           nb::call_guard<nb::gil_scoped_release>());
     m.def("lzw_unpack", &lzw_unpack, "packed"_a.noconvert(), "out"_a.noconvert(),
           nb::call_guard<nb::gil_scoped_release>());
