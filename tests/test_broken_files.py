@@ -12,14 +12,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 from test_inputs import INPUTS, chunk, pcd, ply, text, tiff
-from test_io import perceptron_header
+from test_scanner_files import perceptron_header
 
 import rangeedge
 from rangeedge import imreadRange
 from rangeedge.io import source
 
+GRID = ("element range_grid 6", "property list uchar int vertex_indices")
+ENCODINGS = ("ascii", "binary_little_endian", "binary_big_endian")
 SLOW = 2.0  # seconds, for any small file
 READ = [entry for entry in INPUTS if entry.content and not isinstance(entry.right, str)]
 
@@ -75,6 +79,46 @@ def test_changed_files(tmp_path, capfd, entry):
         assert capfd.readouterr() == ("", "")
 
 
+# Made up
+
+SUN = struct.pack(">8I", 0x59A66A95, 512, 512, 8, 512 * 512, 1, 0, 0)
+SIZE = ("obj_info num_cols 3", "obj_info num_rows 2")
+PREFIXES = [
+    *(
+        b"\x89PNG\r\n\x1a\n",
+        b"II*\0",
+        b"MM\0*",
+        b"II+\0\x08\0\0\0",
+        b"\x76\x2f\x31\x01",
+        b"Pf\n3 2\n-1\n",
+        b"Pf ",
+        b"PF\n",
+    ),
+    *(b"P5\n3 2\n65535\n", b"P2 ", b"PK\x03\x04", b"ncols 3\nnrows 2\n", b"ply\n", SUN, SUN[:4], b""),
+    *(
+        b"\x93NUMPY\x01\x00",
+        b"\x93NUMPY",
+        b"\x93NUMPY\x01\x00\x4f\x00{'descr': '<f4', 'fortran_order': False, 'shape': (",
+    ),
+    *(b"VERSION .7\n", b"# x\nFIELDS x y z\n", b"rows : 512\ncols : 512\n", b"rows 2\ncols 3\n\n"),
+    *(pcd(data, b"", WIDTH=3, HEIGHT=2, POINTS=6) for data in ("ascii", "binary", "binary_compressed")),
+    *(ply(*SIZE, "element vertex 6", "property uchar x", *GRID, body=b"", encoding=e) for e in ENCODINGS),
+    ply(*SIZE, "element vertex ", body=b"")[:-11],
+]
+
+
+@settings(max_examples=400, deadline=None)
+@given(prefix=st.sampled_from(PREFIXES), rest=st.binary(max_size=300))
+@example(prefix=b"\x93NUMPY\x01\x00", rest=b"\x00")
+def test_any_bytes(tmp_path_factory, prefix, rest):
+    path = tmp_path_factory.getbasetemp() / "made up"
+    path.write_bytes(prefix + rest)
+    found = image_or_reason(path)
+    if not isinstance(found, str):
+        assert found.src.size
+        assert found.src.ndim in (2, 3)
+
+
 # What would fill the memory, or never end
 
 
@@ -97,7 +141,6 @@ def zipped(tmp_path, **sizes):
 
 
 BIG = source.UNPACKED_FREELY + 2**20
-LIST = ("element range_grid 6", "property list uchar int vertex_indices")
 BOMBS = [
     ("PNG", lambda _: png_header(11_600, 11_600) + chunk(b"IEND", b""), "taken for a bomb"),
     ("PNG of too many pixels", lambda _: png_header(2**31 - 1, 2**31 - 1) + chunk(b"IEND", b""), "pixels are more"),
@@ -113,7 +156,7 @@ BOMBS = [
     ("PCD of one long word", lambda _: pcd("ascii", b"1" * 5 * 10**6), "word of a million"),
     ("PLY without an end", lambda _: b"ply\n" + b"comment\n" * 10**6, "no end"),
     ("PLY of many vertices", lambda _: ply(f"element vertex {10**15}", "property char x", body=b""), "truncated"),
-    ("PLY of many lists", lambda _: ply("element vertex 1" + "0" * 15, LIST[1], body=b""), "it ends within"),
+    ("PLY of many lists", lambda _: ply("element vertex 1" + "0" * 15, GRID[1], body=b""), "it ends within"),
     ("one line", lambda _: b"a" * 10**7, "none of PNG"),
     ("NUL", lambda _: bytes(10**7), "none of PNG"),
 ]
