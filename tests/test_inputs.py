@@ -258,7 +258,7 @@ PICTURES = [
     Input("ASCII grid of oblong cells", grid("DX 0.5", "DY 0.25"), HEIGHTS64, HALF_CELLS),
     Input("ASCII grid without its cells", grid(), "no proper CELLSIZE"),
     Input("PNG interlaced", png_in_passes(MILLIMETRES), MILLIMETRES),
-    Input("a poem", text("Roses are", "red", "violets"), "no known text format"),
+    Input("a poem", text("Roses are", "red", "violets"), "none of PNG"),
 ]
 
 # Clouds

@@ -122,7 +122,7 @@ def test_truncated_scans(tmp_path, end):
     ("lines", "what"),
     [
         (perceptron_header(4, 4), "no Perceptron"),
-        (["a poem", "in three lines", "without numbers", "at all"], "no known text format"),
+        (["a poem", "in three lines", "without numbers", "at all"], "none of PNG"),
         (["2", "lines"], "none of PNG"),
         (["rows 2", "cols 3", "", "1 2 3"], "where 24 values"),
     ],

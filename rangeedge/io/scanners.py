@@ -68,10 +68,12 @@ def read_perceptron(data: bytes) -> np.ndarray:
 
 
 _TECHNICAL_ARTS_HEADER = re.compile(rb"(?:[\x20-\x7e\t\r]{0,200}\n){3}")
+_FIRST_NUMBER = re.compile(rb"\s*[-+]?[\d.]")
 
 
 def is_technical_arts(head: bytes) -> bool:
-    return _TECHNICAL_ARTS_HEADER.match(head) is not None
+    header = _TECHNICAL_ARTS_HEADER.match(head)
+    return header is not None and _FIRST_NUMBER.match(head, header.end()) is not None
 
 
 def read_technical_arts(data: bytes) -> RangeImage:
