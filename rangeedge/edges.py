@@ -167,7 +167,8 @@ def edgeStrength(
     src : ndarray
         (H, W) depth, or points (H, W, 3) or (H, W, 4) in the camera frame (x right, y down, z away).
         Integers are divided by `depthFactor` and invalid where <= 0. With `K`, depths that are not positive and
-        finite are invalid; without it, only non-finite values are. Heights (`heightMap`) may not be signed integers.
+        finite are invalid; without it, only non-finite values are. Heights (`heightMap`) may be negative: of signed
+        integers only the least of the type is invalid.
         A point is invalid if a coordinate is not finite, if all are 0, or if it lies behind the viewpoint.
     mask : ndarray of shape (H, W), 8-bit or bool, optional
         Non-zero where pixels are used.
