@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import _core
+from ._option import parsed, takes
 from .frame import Frame, read_frame
 from .noise_model import NoiseModel
-from .options import GEOMETRY, ScanLineParams, parsed, takes
+from .options import GEOMETRY, ScanLineParams
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

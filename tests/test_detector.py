@@ -296,6 +296,9 @@ def test_object_finds_what_the_functions_find(scene, detector):
         detector.detectEdges(scene, 0.2, 40, **selection), detectEdges(scene, 0.2, 40, **options, **selection)
     )
     np.testing.assert_array_equal(detector.detectEdges(scene), detectEdges(scene, **options))
+    edges, strength = detector.detectEdgesWithStrength(scene, 0.2, 40, **selection)
+    np.testing.assert_array_equal(edges, detectEdges(scene, 0.2, 40, **options, **selection))
+    np.testing.assert_array_equal(strength.significance, edgeStrength(scene, mask=mask, **options).significance)
     dst = np.zeros(scene.shape, np.uint8)
     assert detector.detectEdges(scene, edges=dst) is dst
 
