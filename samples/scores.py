@@ -30,7 +30,7 @@ def main(argv=None):
     }
     for name, found in edges.items():
         scores = evaluateEdges(found, truth, tolerance=3, ignore=nothing)
-        true = np.isin(truth, (1, 2, 3))
+        true = rangeedge.thinEdges(np.isin(truth, (1, 2, 3)))
         merit, error = prattFOM(found, true), baddeleyDelta(found, true)
         print(f"{name}: F {scores.f:.3f}, Pratt's figure of merit {merit:.3f}, Baddeley's error {error:.2f}")
     labels = rangeedge.segmentRegions(scan.src, **scan.geometry)
