@@ -1,6 +1,7 @@
 // A range image and its noise as Python hands them over: once, for every kernel to use.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <array>
 #include <variant>
 
@@ -11,8 +12,8 @@ namespace rangeedge::python {
 
 // They keep the arrays alive to which their kernels' side points.
 struct BoundNoise {
-    BoundNoise(double a, double b, double c, double correlation, Image<float> map)
-        : map(map), noise{a, b, c, correlation, map.data()} {}
+    BoundNoise(double a, double b, double c, double correlation, Image<float> deviations)
+        : map(deviations), noise{a, b, c, correlation, deviations.data()} {}
 
     Image<float> map;
     Noise noise;
@@ -22,15 +23,15 @@ struct BoundFrame {
     using Samples = nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>;
 
     template <class T>
-    BoundFrame(nb::ndarray<const T, nb::c_contig, nb::device::cpu> samples, bool projective,
+    BoundFrame(nb::ndarray<const T, nb::c_contig, nb::device::cpu> values, bool projective,
                const std::array<double, 6>& to_plane, const std::array<double, 3>& axis, const BoundNoise& noise)
-        : samples(samples), map(noise.map) {
-        const bool points = samples.ndim() == 3;
+        : samples(values), map(noise.map) {
+        const bool points = values.ndim() == 3;
         Frame<T> own{};
-        own.rows = rows(samples);
-        own.cols = cols(samples);
-        own.ordinate = points ? nullptr : samples.data();
-        own.points = points ? samples.data() : nullptr;
+        own.rows = rows(values);
+        own.cols = cols(values);
+        own.ordinate = points ? nullptr : values.data();
+        own.points = points ? values.data() : nullptr;
         own.projective = projective;
         std::copy(to_plane.begin(), to_plane.end(), own.to_plane);
         std::copy(axis.begin(), axis.end(), own.axis);
