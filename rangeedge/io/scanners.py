@@ -82,9 +82,7 @@ def read_technical_arts(data: bytes) -> RangeImage:
     header = data[:start].decode("ascii").lower()
     sizes = [int(word) for word in re.findall(r"(?<![\w.+-])\d{1,9}(?![\w.])", header)[:2]]
     if len(sizes) < 2:
-        raise ValueError(
-            "it is no known text format: its first three lines do not give rows and columns"
-        )
+        raise ValueError("it is no known text format: its first three lines do not give rows and columns")
     rows, cols = sizes[::-1] if 0 <= header.find("col") < header.find("row") else sizes
     expect_pixels(rows, cols)
     flag, x, y, z = numbers(data, start, 4 * rows * cols).reshape(4, rows, cols)
