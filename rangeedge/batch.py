@@ -13,6 +13,7 @@ import cv2
 
 from ._args import boolean, described, error, fail, integer
 from .io import RangeImage, imreadRange
+from .io.source import file_name
 from .results import EdgeResults, detection, edge_files, find_edges, plain, write_folder
 
 
@@ -71,18 +72,28 @@ def detectBatch(
     ['failed']
     """
     func = "detectBatch"
-    if isinstance(paths, (str, bytes, os.PathLike)):
+    if isinstance(paths, (str, bytes, os.PathLike)) or not isinstance(paths, Iterable):
         raise fail(func, "paths", "an iterable of file names", described(paths))
+    out = file_name(func, out, "out")
     jobs = integer(func, "jobs", jobs, 1)
     force = boolean(func, "force", force)
     detection(func, {name: value for name, value in options.items() if name not in ("mask", "calibration")})
     folders: dict[Path, str] = {}
-    for path in map(os.fspath, paths):
-        folder = Path(out) / Path(path).stem
+    for path in (file_name(func, path, "paths") for path in paths):
+        folder = Path(out) / _folder_name(func, path)
         if folder in folders:
             raise error(func, f"{folders[folder]!r} and {path!r} would be written to the same folder")
         folders[folder] = path
     return _results([(path, folder) for folder, path in folders.items()], jobs, force, options)
+
+
+def _folder_name(func: str, path: str) -> str:
+    """The name of an image without its suffix; with it where only dots would be left, which lead out of the folder."""
+    name = Path(path).name
+    if not name.strip("."):
+        raise fail(func, "paths", "names of files", repr(path))
+    stem = Path(name).stem
+    return stem if stem.strip(".") else name
 
 
 def _results(tasks: list[tuple[str, Path]], jobs: int, force: bool, options: dict[str, Any]) -> Iterator[BatchItem]:
@@ -119,7 +130,7 @@ def read_image(path: str, options: dict[str, Any]) -> RangeImage:
     known = image.geometry
     if "K" in options or "pixelSize" in options:
         known = {name: value for name, value in known.items() if name == "depthFactor"}
-    return RangeImage(image.src, {**known, **options})
+    return image._replace(geometry={**known, **options})
 
 
 def _is_done(path: str, folder: Path, options: dict[str, Any]) -> bool:

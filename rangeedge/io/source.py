@@ -31,14 +31,14 @@ _KINDS = (
 )
 
 
-def file_name(func: str, path: Any) -> str:
+def file_name(func: str, path: Any, argument: str = "path") -> str:
     """The name that `path` stands for."""
     try:
         name = os.fspath(path) if isinstance(path, (str, os.PathLike)) else None
     except TypeError:  # from a path that returns no name
         name = None
     if name is None:
-        raise _args.fail(func, "path", "a file name (str or path)", type(path).__name__)
+        raise _args.fail(func, argument, "a file name (str or path)", type(path).__name__)
     return os.fsdecode(name)
 
 
