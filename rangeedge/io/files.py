@@ -112,7 +112,7 @@ def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None)
         image = found if isinstance(found, RangeImage) else RangeImage(found)
         image = image._replace(src=_range_image(image.src))
         if image.geometry:
-            range_frame("imreadRange", image.src, **image.geometry)
+            range_frame("imreadRange", image.src[:1, :1], **image.geometry)  # whether they fit
         return image
 
 
@@ -186,6 +186,8 @@ def imwriteRange(
         data = _WRITERS[suffix](_native(src), **given)
     except ValueError as reason:
         raise _args.fail("imwriteRange", "src", f"{reason} for {suffix}", _args.described(src)) from None
+    except ImportError as reason:
+        raise _args.error("imwriteRange", f"cannot write {name!r}: {reason}") from reason
     try:
         write_atomically(name, data)
     except (OSError, ValueError) as reason:

@@ -56,7 +56,7 @@ def opened(func: str, name: str) -> Iterator[tuple[BinaryIO, int]]:
         raise _args.error(func, f"cannot read {name!r}: {what}", cv2.Error.StsObjectNotFound) from reason
     except Exception as reason:  # NumPy, zipfile and OpenCV raise two dozen types on a garbled file
         what = reason.err if isinstance(reason, cv2.error) else str(reason)
-        if not isinstance(reason, (ValueError, cv2.error)):
+        if not isinstance(reason, (ValueError, ImportError, cv2.error)):
             what = f"it is garbled ({type(reason).__name__}: {reason})"
         raise _args.error(func, f"cannot read {name!r}: {what}", cv2.Error.StsParseError) from reason
 

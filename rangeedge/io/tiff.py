@@ -6,7 +6,6 @@ installed.
 
 from __future__ import annotations
 
-import lzma
 import math
 import struct
 import zlib
@@ -175,6 +174,8 @@ def _deflate(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> bytes:
 
 
 def _lzma(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> bytes:
+    import lzma  # not every Python has it
+
     return lzma.LZMADecompressor(memlimit=2**28).decompress(packed.tobytes(), _size(shape, dtype))
 
 
@@ -217,7 +218,7 @@ def _imagecodecs(compression: str) -> ModuleType:
     try:
         import imagecodecs
     except ImportError:
-        raise ValueError(
+        raise ImportError(
             f"it is compressed by {compression}, for which imagecodecs is needed: pip install 'rangeedge[tiff]', or "
             "store it uncompressed or by deflate"
         ) from None
