@@ -6,6 +6,7 @@ import math
 import struct
 from array import array
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import chain, islice
 from typing import NamedTuple
 
@@ -78,7 +79,8 @@ class _Property(NamedTuple):
     length_type: str | None  # of a list; None: one value
 
 
-class _Element(NamedTuple):
+@dataclass(frozen=True)
+class _Element:
     name: str
     count: int
     properties: list[_Property]
@@ -239,7 +241,7 @@ def _ply_size(header: dict[str, int], tables: dict[str, dict[str, np.ndarray]], 
             return header[rows], header[cols]
     view = tables.get("camera", {})
     if {"viewportx", "viewporty"} <= view.keys() and len(view["viewportx"]) == 1:
-        rows, cols = int(view["viewporty"][0]), int(view["viewportx"][0])
-        if cols > 1 and rows > 1 and rows * cols == vertices:
-            return rows, cols
+        height, width = int(view["viewporty"][0]), int(view["viewportx"][0])
+        if height > 1 and width > 1 and height * width == vertices:
+            return height, width
     raise unorganized("no obj_info num_cols and num_rows, no comment with width and height")
