@@ -359,3 +359,11 @@ def test_real_png(real):
         assert src.dtype == np.uint16
         z = np.where(src == 0, np.nan, src / 1000).astype(np.float32)
         assert_array_equal(z, real.mosd(name)["z"])
+
+
+def test_a_geometry_given_replaces_that_of_the_file():
+    image = rangeedge.RangeImage(np.ones((2, 3)), {"pixelSize": (1.0, 1.0), "heightMap": True, "depthFactor": 500.0})
+    assert image.withGeometry().geometry == image.geometry
+    assert image.withGeometry(K=K).geometry == {"depthFactor": 500.0, "K": K}
+    assert image.withGeometry(depthFactor=1.0).geometry == {**image.geometry, "depthFactor": 1.0}
+    assert image.withGeometry(pixelSize=2.0).geometry == {"depthFactor": 500.0, "pixelSize": 2.0}
