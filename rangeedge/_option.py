@@ -30,7 +30,7 @@ class Option:
     unit: str = ""
     kept: str = ""  # annotation of the value once checked, where that is not the annotation of the field
     read: Callable[[str], Any] = float  # of the command line; bool is a switch
-    metavar: str = "X"
+    metavar: str = ""  # of the command line
     flagged: str = ""  # what the help of the command line says instead of `text` and the default
     choices: Mapping[str, int] = field(default_factory=dict)  # words of the command line
     constants: Mapping[str, int] = field(default_factory=dict)  # of which the value is one
@@ -46,8 +46,10 @@ class Option:
 
 
 def option(default: Any, check: Check, form: str, text: str, **more: Any) -> Any:
-    """A field of a class of options."""
-    return field(default=default, metadata={"option": Option(default, check, form, text, **more)})
+    """A field of a class of options. The command line reads it as what its default is, or as `read` says."""
+    plain = type(default) if isinstance(default, (bool, int)) else float
+    told = {"read": plain, "metavar": "N" if plain is int else "X", **more}
+    return field(default=default, metadata={"option": Option(default, check, form, text, **told)})
 
 
 class Options:
@@ -97,10 +99,10 @@ def _with_options(doc: str | None, options: Collection[Option]) -> str | None:
     return doc.replace("    {options}", textwrap.indent("\n".join(own.documented for own in options), "    "))
 
 
-def takes(options: Mapping[str, Option], **shown_default: Any) -> Callable[[_Function], _Function]:
+def takes(options: Mapping[str, Option], *, default: Any = None) -> Callable[[_Function], _Function]:
     """Let a public function take options as `**options`: refuse others, show and document these.
 
-    The signature shows their defaults, or `default` where that is given.
+    The signature shows their defaults, or `default` for all of them where that is given.
     """
 
     def taking(function: _Function) -> _Function:
@@ -109,8 +111,7 @@ def takes(options: Mapping[str, Option], **shown_default: Any) -> Callable[[_Fun
         others = [option for name, option in options.items() if name not in signature.parameters]
         keyword = inspect.Parameter.KEYWORD_ONLY
         shown = [
-            inspect.Parameter(o.name, keyword, default=shown_default.get("default", o.default), annotation=o.annotation)
-            for o in others
+            inspect.Parameter(o.name, keyword, default=default or o.default, annotation=o.annotation) for o in others
         ]
         allowed = [p.name for p in (*own, *shown)]
 

@@ -153,7 +153,6 @@ class ScanLineParams(Options):
         "bool",
         "Whether larger values are nearer to the viewer.",
         group="geometry",
-        read=bool,
     )
     depthFactor: float = option(
         1000.0,
@@ -230,8 +229,6 @@ class ScanLineParams(Options):
         "Widest gap of invalid pixels on a scan line whose two sides are compared: occlusion shadows.",
         unit="pixels",
         group="scan lines",
-        read=int,
-        metavar="N",
     )
     mergeSignificance: float = option(
         5.0,
@@ -291,8 +288,6 @@ class Selection(Options):
         "int",
         "Least length of a connected line, >= 1: the longer side of its bounding box.",
         unit="pixels",
-        read=int,
-        metavar="N",
     )
     dynamic: bool = option(
         False,
@@ -300,7 +295,6 @@ class Selection(Options):
         "bool",
         "Whether to remove lines that do not stand out of the noise, by the statistics of all of them (Venkatesh and"
         " Rosin).",
-        read=bool,
     )
 
 
@@ -354,8 +348,6 @@ class Growing(Seeding):
         "Least area of a region.",
         unit="pixels",
         group="regions",
-        read=int,
-        metavar="N",
     )
 
 

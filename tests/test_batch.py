@@ -146,3 +146,30 @@ def test_command_refuses_bad_options(images, tmp_path, capsys):
     argv = ["batch", *map(str, images), "--out", str(tmp_path / "out")]
     assert main([*argv, "--jobs", "0"]) == 2
     assert "jobs" in capsys.readouterr().err
+
+
+def test_names_of_dots_stay_in_the_folder(images, tmp_path):
+    names = ["..png", "...png", "....png", ".png", "a..png"]
+    for name in names:
+        (tmp_path / name).write_bytes(images[0].read_bytes())
+    items = list(detectBatch([tmp_path / name for name in names], tmp_path / "a" / "b", K=K))
+    assert states(items) == ["written"] * 5
+    folders = {"..png", "...png", "....png", ".png", "a."}
+    assert {path.name for path in (tmp_path / "a" / "b").iterdir()} == folders
+    assert [path.name for path in (tmp_path / "a").iterdir()] == ["b"]
+    assert all((tmp_path / "a" / "b" / name / "report.json").is_file() for name in folders)
+
+
+@pytest.mark.parametrize("name", ["", ".", "..", "a/..", "/"])
+def test_what_names_no_file(tmp_path, name):
+    with pytest.raises(error, match="`paths` must be names of files"):
+        detectBatch([name], tmp_path)
+
+
+def test_bad_names(images, tmp_path):
+    for paths in ([None], [5], [b"x.png"], 5, None):
+        with pytest.raises(error, match="detectBatch: `paths` must be"):
+            detectBatch(paths, tmp_path)
+    for out in (None, 5, b"x"):
+        with pytest.raises(error, match="detectBatch: `out` must be a file name"):
+            detectBatch(images, out)

@@ -616,3 +616,37 @@ def test_errors_travel_between_processes():
         raised.value.code,
         str(raised.value),
     )
+
+
+# Words
+
+
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [(0, "none"), (1, "jump"), (np.uint8(9), "jump occluding"), (17, "jump occluded"), (2, "convex"), (4, "concave"),
+     (32, "boundary"), (63, "jump occluding occluded convex concave boundary")],
+)  # fmt: skip
+def test_names_of_kinds(kind, words):
+    assert rangeedge.kindNames(kind) == words
+
+
+@pytest.mark.parametrize("kind", [-1, 64, 1.0, True, "jump", np.zeros(3, np.uint8)])
+def test_no_kinds(kind):
+    with pytest.raises(rangeedge.error, match="kindNames: `kind` must be an integer from 0 to 63, got"):
+        rangeedge.kindNames(kind)
+
+
+def test_results_print_counts_and_ranges():
+    jump, crease, significance = np.zeros((3, 4, 5), np.float32)
+    jump[1, 1:3], crease[0, 0], significance[1] = (0.25, 1.5), 45, 13
+    strength = rangeedge.EdgeStrength(jump, crease, np.zeros((4, 5), np.uint8), significance)
+    expected = (
+        "EdgeStrength(5 x 4 pixels; jump at 2 from 0.25 to 1.5; crease at 1 from 45 to 45 degrees; "
+        "significance at 5 from 13 to 13)"
+    )
+    assert repr(strength) == str(strength) == expected
+    image = rangeedge.RangeImage(np.array([[0, 700, 1200]], np.uint16), {"K": np.eye(3)})
+    assert repr(image) == "RangeImage(uint16 of shape (1, 3), 2 values from 700 to 1200, K)"
+    assert "no data" in repr(rangeedge.RangeImage(np.full((2, 2), np.nan), {}))
+    assert repr(rangeedge.NoiseModel(a=1e-3, correlation=2)) == "NoiseModel(a=0.001, correlation=2)"
+    assert repr(rangeedge.ScanLineParams(K=np.eye(3))) == "ScanLineParams(K=float64 array of shape (3, 3))"

@@ -140,10 +140,10 @@ def test_exr_there_and_back(tmp_path):
 
 def test_exr_without_its_package(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "OpenEXR", None)
-    with pytest.raises(rangeedge.error, match=r"pip install 'rangeedge\[exr\]'"):
+    with pytest.raises(rangeedge.error, match=r"cannot write .*: for EXR .*: pip install 'rangeedge\[exr\]'"):
         imwriteRange(tmp_path / "a.exr", depth32())
     assert not list(tmp_path.iterdir())
-    with pytest.raises(rangeedge.error, match=r"pip install 'rangeedge\[exr\]'"):
+    with pytest.raises(rangeedge.error, match=r"cannot read .*: for EXR .*: pip install 'rangeedge\[exr\]'"):
         imreadRange(written(tmp_path, "a.exr", body=b"\x76\x2f\x31\x01"))
 
 
@@ -304,7 +304,7 @@ atomic.write_atomically(sys.argv[1], b"new")
 @pytest.mark.skipif(sys.platform != "linux", reason="files without a name are of Linux")
 def test_a_killed_write_leaves_nothing(tmp_path):
     """Killed when all is written, and only the name is missing."""
-    run = subprocess.run([sys.executable, "-c", KILLED, tmp_path / "a"], check=False)
+    run = subprocess.run([sys.executable, "-c", KILLED, tmp_path / "a"], cwd=tmp_path, check=False)
     assert run.returncode == -9
     assert not list(tmp_path.iterdir())
 
@@ -359,3 +359,11 @@ def test_real_png(real):
         assert src.dtype == np.uint16
         z = np.where(src == 0, np.nan, src / 1000).astype(np.float32)
         assert_array_equal(z, real.mosd(name)["z"])
+
+
+def test_a_geometry_given_replaces_that_of_the_file():
+    image = rangeedge.RangeImage(np.ones((2, 3)), {"pixelSize": (1.0, 1.0), "heightMap": True, "depthFactor": 500.0})
+    assert image.withGeometry().geometry == image.geometry
+    assert image.withGeometry(K=K).geometry == {"depthFactor": 500.0, "K": K}
+    assert image.withGeometry(depthFactor=1.0).geometry == {**image.geometry, "depthFactor": 1.0}
+    assert image.withGeometry(pixelSize=2.0).geometry == {"depthFactor": 500.0, "pixelSize": 2.0}

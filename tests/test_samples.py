@@ -28,7 +28,7 @@ PICTURES = {
 def from_samples(monkeypatch):
     monkeypatch.syspath_prepend(SAMPLES)
     yield
-    for name in ("common", "figure6", *PICTURES):
+    for name in ("common", "figure6", "scores", *PICTURES):
         sys.modules.pop(name, None)
 
 
@@ -50,7 +50,7 @@ def image(tmp_path):
 
 
 def test_every_sample_is_tested():
-    assert {path.stem for path in SAMPLES.glob("*.py")} == {"common", "figure6", *PICTURES}
+    assert {path.stem for path in SAMPLES.glob("*.py")} == {"common", "figure6", "scores", *PICTURES}
 
 
 @pytest.mark.parametrize("name", PICTURES)
@@ -137,3 +137,13 @@ def test_figure6_refuses_bad_options(argv, capsys):
         run("figure6", "--frequency", "3", "--pairs", "1", *argv)
     assert exit_.value.code == 2
     assert "usage" in capsys.readouterr().err
+
+
+def test_scores_prefer_rangeedge(capsys):
+    run("scores")
+    ours, canny, regions = capsys.readouterr().out.splitlines()
+    values = [[float(word.split()[-1]) for word in line.split(",")] for line in (ours, canny)]
+    assert values[0][0] > 0.98 > values[1][0]
+    assert values[0][1] > values[1][1]
+    assert values[0][2] < values[1][2]
+    assert regions.startswith("regions after Hoover: truth ")

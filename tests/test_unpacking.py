@@ -218,3 +218,32 @@ def test_zlib_is_bounded():
     """What the readers rely on: a decompressor stops at the size that it is given."""
     bomb = zlib.compress(bytes(10**7))
     assert len(zlib.decompressobj().decompress(bomb, 100)) == 100
+
+
+def slow_first_items(data, count, length_bytes, big_endian, item_bytes):
+    first, at = [], 0
+    for _ in range(count):
+        if at + length_bytes > len(data):
+            return None
+        length = int.from_bytes(data[at : at + length_bytes], "big" if big_endian else "little")
+        at += length_bytes
+        first.append(at if length else -1)
+        at += length * item_bytes
+        if at > len(data):
+            return None
+    return first, at
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(st.sampled_from([0, 0, 0, 0, 1, 1, 2, 3, 255]), max_size=60).map(bytes),
+    *(st.integers(0, 12), st.sampled_from([1, 2, 4]), st.booleans(), st.sampled_from([1, 2, 4, 8])),
+)
+def test_lists_of_ply(data, count, length_bytes, big_endian, item_bytes):
+    first = np.zeros(count, np.int64)
+    end = _core.ply_first_items(np.frombuffer(data, np.uint8), length_bytes, big_endian, item_bytes, first)
+    expected = slow_first_items(data, count, length_bytes, big_endian, item_bytes)
+    if expected is None:
+        assert end > len(data)
+    else:
+        assert (first.tolist(), end) == expected

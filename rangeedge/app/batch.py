@@ -16,6 +16,7 @@ from .. import __version__
 from .._check import boolean, described, error, fail, integer
 from .._option import parsed, takes
 from ..io import RangeImage, imreadRange
+from ..io.source import file_name
 from ..options import DETECTION, ScanLineParams, Selection
 from .results import EdgeResults, edge_files, find_edges, plain, write_folder
 
@@ -83,19 +84,29 @@ def detectBatch(
     >>> [item.state for item in detectBatch(["missing.png"], tempfile.mkdtemp())]
     ['failed']
     """
-    if isinstance(paths, (str, bytes, os.PathLike)):
+    if isinstance(paths, (str, bytes, os.PathLike)) or not isinstance(paths, Iterable):
         raise fail("paths", "an iterable of file names", described(paths))
+    out = file_name(out, "out")
     jobs = integer("jobs", jobs, 1)
     force = boolean("force", force)
     parsed(options, ScanLineParams, Selection)
     options |= {name: value for name, value in (("mask", mask), ("calibration", calibration)) if value is not None}
     folders: dict[Path, str] = {}
-    for path in map(os.fspath, paths):
-        folder = Path(out) / Path(path).stem
+    for path in (file_name(path, "paths") for path in paths):
+        folder = Path(out) / _folder_name(path)
         if folder in folders:
             raise error(f"{folders[folder]!r} and {path!r} would be written to the same folder")
         folders[folder] = path
     return _results([(path, folder) for folder, path in folders.items()], jobs, force, options)
+
+
+def _folder_name(path: str) -> str:
+    """The name of an image without its suffix; with it where only dots would be left, which lead out of the folder."""
+    name = Path(path).name
+    if not name.strip("."):
+        raise fail("paths", "names of files", repr(path))
+    stem = Path(name).stem
+    return stem if stem.strip(".") else name
 
 
 def _results(tasks: list[tuple[str, Path]], jobs: int, force: bool, options: dict[str, Any]) -> Iterator[BatchItem]:

@@ -193,7 +193,7 @@ def _help(option: Option) -> str:
         default = word if value == option.default else default
     known = [option.unit] if option.unit else []
     if default is not None and default is not False:
-        known.append(f"default: {default if option.choices else f'{default:g}'}")
+        known.append(f"default: {f'{default:g}' if isinstance(default, float) else default}")
     return text.replace("``numpy.inf``", "inf").replace("%", "%%") + (f" ({'; '.join(known)})" if known else "")
 
 

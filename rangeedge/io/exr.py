@@ -54,7 +54,7 @@ def _depth_or_points(channels: dict[str, np.ndarray]) -> np.ndarray:
         layers.setdefault(layer, {})[channel] = name
     listed = ", ".join(channels)
 
-    depths = [name for layer, found in layers.items() if (name := _depth_channel(layer, found))]
+    depths = [depth for layer, found in layers.items() if (depth := _depth_channel(layer, found))]
     if len(depths) > 1:
         raise ValueError(f"which of its channels {', '.join(depths)} is meant? Store that one alone")
     if depths:
@@ -96,9 +96,9 @@ def write_exr(src: np.ndarray) -> bytes:
 
 def _openexr() -> ModuleType:
     try:
-        import OpenEXR
+        import OpenEXR  # type: ignore[import-not-found, unused-ignore]
     except ImportError:
-        raise ValueError(
+        raise ImportError(
             "for EXR the package OpenEXR is needed: pip install 'rangeedge[exr]', or store the depth as .tiff or .npy"
         ) from None
     return OpenEXR

@@ -45,7 +45,7 @@ def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None)
 
     - PNG, one channel of 16 bits;
     - TIFF and BigTIFF, one channel, or x, y and z as three: integers or floats of 16 to 64 bits, strips or tiles,
-      uncompressed or packed by LZW, deflate, LZMA or PackBits; by ZSTD, LERC and others with the extra ``[tiff]``.
+      uncompressed or packed by LZW, deflate, LZMA or PackBits; by ZSTD or LERC with the extra ``[tiff]``.
       GDAL's value of no data is honoured (floats become NaN, unsigned integers 0, signed ones their least value), and
       so are floats of 1e38 and more. Of a GeoTIFF the pixel size is known too (degrees as metres at its middle
       latitude), ``heightMap=True``, and for integers ``depthFactor=1``;
@@ -117,7 +117,7 @@ def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None)
         image = found if isinstance(found, RangeImage) else RangeImage(found)
         image = image._replace(src=_range_image(image.src))
         if image.geometry:
-            read_frame(image.src, ScanLineParams(**image.geometry))
+            read_frame(image.src[:1, :1], ScanLineParams(**image.geometry))  # whether they fit
         return image
 
 
@@ -191,6 +191,8 @@ def imwriteRange(
         data = _WRITERS[suffix](_native(src), **given)
     except ValueError as reason:
         raise _check.fail("src", f"{reason} for {suffix}", _check.described(src)) from None
+    except ImportError as reason:
+        raise _check.error(f"cannot write {name!r}: {reason}") from reason
     try:
         write_atomically(name, data)
     except (OSError, ValueError) as reason:

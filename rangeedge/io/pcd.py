@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from typing import NamedTuple
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -58,7 +58,8 @@ def write_pcd(points: np.ndarray) -> bytes:
     return header.encode() + points.astype("<f4").tobytes()
 
 
-class _Field(NamedTuple):
+@dataclass(frozen=True)
+class _Field:
     name: str
     type: np.dtype
     count: int

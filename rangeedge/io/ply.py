@@ -6,11 +6,13 @@ import math
 import struct
 from array import array
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
 
+from .. import _core
 from .points import points_of, unorganized
 from .source import expect_at_least, expect_pixels
 from .text import header_lines, number, words
@@ -77,7 +79,8 @@ class _Property(NamedTuple):
     length_type: str | None  # of a list; None: one value
 
 
-class _Element(NamedTuple):
+@dataclass(frozen=True)
+class _Element:
     name: str
     count: int
     properties: list[_Property]
@@ -88,6 +91,7 @@ _PLY_TYPES = {
     **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
     **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
 }
+_COUNTS = ("u1", "u2", "u4", "i4")  # lengths of lists that the kernel reads; below zero they exceed the file
 _STRUCT_CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
 
 
@@ -103,6 +107,8 @@ class _PlyBody:
             raise ValueError(f"its element {element.name} has no properties")
         if all(prop.length_type is None for prop in element.properties):
             return self._scalars(element)
+        if self.byte_order and len(element.properties) == 1 and element.properties[0].length_type in _COUNTS:
+            return self._lists(element)
         try:
             firsts = np.array(array("d", self._firsts(element)))
         except (struct.error, IndexError, OverflowError):
@@ -116,6 +122,22 @@ class _PlyBody:
         records = np.ndarray(element.count, layout, self.data, self.at)
         self.at = end
         return {prop.name: records[prop.name] for prop in element.properties}
+
+    def _lists(self, element: _Element) -> dict[str, np.ndarray]:
+        """The first items of an element that is one list, as of a range_grid or of faces."""
+        (prop,) = element.properties
+        data = np.frombuffer(self.data, np.uint8, offset=self.at)
+        length, item = np.dtype(prop.length_type), np.dtype(self.byte_order + prop.type)
+        expect_at_least(len(data), element.count * length.itemsize)
+        at = np.empty(element.count, np.int64)
+        end = _core.ply_first_items(data, length.itemsize, self.byte_order == ">", item.itemsize, at)
+        expect_at_least(len(data), end)
+        self.at += end
+        values = np.full(element.count, -1.0)
+        filled = at >= 0
+        items = data[at[filled, None] + np.arange(item.itemsize)]
+        values[filled] = np.ascontiguousarray(items).view(item)[:, 0]
+        return {prop.name: values}
 
     def _firsts(self, element: _Element) -> Iterator[float]:
         readers = [
@@ -219,7 +241,7 @@ def _ply_size(header: dict[str, int], tables: dict[str, dict[str, np.ndarray]], 
             return header[rows], header[cols]
     view = tables.get("camera", {})
     if {"viewportx", "viewporty"} <= view.keys() and len(view["viewportx"]) == 1:
-        rows, cols = int(view["viewporty"][0]), int(view["viewportx"][0])
-        if cols > 1 and rows > 1 and rows * cols == vertices:
-            return rows, cols
+        height, width = int(view["viewporty"][0]), int(view["viewportx"][0])
+        if height > 1 and width > 1 and height * width == vertices:
+            return height, width
     raise unorganized("no obj_info num_cols and num_rows, no comment with width and height")

@@ -19,8 +19,13 @@ def points_of(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     names = {name.lower(): name for name in columns}
     if not {"x", "y", "z"} <= names.keys():
         raise ValueError(f"its points have no x, y and z but {', '.join(columns) or 'nothing'}")
-    points = float32(np.stack([columns[names[axis]] for axis in "xyz"], axis=-1))
-    points[~np.isfinite(points).all(axis=-1)] = np.nan
+    points = np.empty((len(columns[names["x"]]), 3), np.float32)
+    missing = np.zeros(len(points), bool)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for k, axis in enumerate("xyz"):
+            points[:, k] = columns[names[axis]]
+            missing |= ~np.isfinite(points[:, k])
+    points[missing] = np.nan
     return points
 
 

@@ -31,14 +31,14 @@ _KINDS = (
 )
 
 
-def file_name(path: Any) -> str:
+def file_name(path: Any, argument: str = "path") -> str:
     """The name that `path` stands for."""
     try:
         name = os.fspath(path) if isinstance(path, (str, os.PathLike)) else None
     except TypeError:  # from a path that returns no name
         name = None
     if name is None:
-        raise _check.fail("path", "a file name (str or path)", type(path).__name__)
+        raise _check.fail(argument, "a file name (str or path)", type(path).__name__)
     return os.fsdecode(name)
 
 
@@ -56,7 +56,7 @@ def opened(name: str) -> Iterator[tuple[BinaryIO, int]]:
         raise _check.error(f"cannot read {name!r}: {what}", cv2.Error.StsObjectNotFound) from reason
     except Exception as reason:  # NumPy, zipfile and OpenCV raise two dozen types on a garbled file
         what = reason.err if isinstance(reason, cv2.error) else str(reason)
-        if not isinstance(reason, (ValueError, cv2.error)):
+        if not isinstance(reason, (ValueError, ImportError, cv2.error)):
             what = f"it is garbled ({type(reason).__name__}: {reason})"
         raise _check.error(f"cannot read {name!r}: {what}", cv2.Error.StsParseError) from reason
 

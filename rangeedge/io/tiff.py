@@ -1,15 +1,16 @@
 """Range images in TIFF files: one channel, or the three of points, integers or floats, in strips or tiles.
 
-Read here: uncompressed, PackBits, LZW, deflate and LZMA, each with any predictor. What is compressed otherwise (ZSTD,
-LERC, ...) is left to tifffile and imagecodecs, where they are installed.
+Uncompressed, PackBits, LZW, deflate and LZMA, each with any predictor; ZSTD and LERC by imagecodecs, where it is
+installed.
 """
 
 from __future__ import annotations
 
-import io
-import lzma
+import math
 import struct
 import zlib
+from collections.abc import Callable
+from types import ModuleType
 
 import numpy as np
 
@@ -20,14 +21,16 @@ from .range_image import RangeImage
 from .source import expect_at_least, expect_pixels, expect_unpacked
 from .tiff_tags import Page
 
-_UNCOMPRESSED, _LZW, _DEFLATE, _OLD_DEFLATE, _PACK_BITS, _LZMA = 1, 5, 8, 32946, 32773, 34925
-_COMPRESSIONS = {7: "JPEG", 34887: "LERC", 50000: "ZSTD", 50001: "WebP", 50002: "JPEG XL"}
-_PHOTOMETRICS = {2: "RGB", 3: "a palette", 5: "CMYK", 6: "YCbCr", 8: "CIELab"}
+_UNCOMPRESSED = 1
+_RGB = 2
+_COLOURS = {_RGB: "RGB", 3: "a palette", 5: "CMYK", 6: "YCbCr", 8: "CIELab"}
+Shape = tuple[int, int, int]  # rows, columns, samples
+
 _KINDS = {1: "u", 2: "i", 3: "f", 4: "u"}  # by sample format
 
 
 def read_tiff(data: bytes) -> RangeImage:
-    """The first page, which must be the only one but for overviews and masks."""
+    """The only image of the file; overviews and masks beside it are passed over."""
     reduced, mask = 1, 4
     found = [page for page in tag.pages(data) if not page.value(tag.NEW_SUBFILE_TYPE, 0) & (reduced | mask)]
     if len(found) != 1:
@@ -39,34 +42,50 @@ def read_tiff(data: bytes) -> RangeImage:
 
 
 def _pixels(page: Page, data: bytes) -> np.ndarray:
+    """The image as (rows, cols), or (rows, cols, samples) of points."""
     rows, cols = page.value(tag.LENGTH), page.value(tag.WIDTH)
     expect_pixels(rows, cols)
+    _expect_no_colours(page)
     dtype, samples = _sample_type(page)
-    compression = page.value(tag.COMPRESSION, _UNCOMPRESSED)
     size = rows * cols * samples * dtype.itemsize
+    compression = page.value(tag.COMPRESSION, _UNCOMPRESSED)
     if compression == _UNCOMPRESSED:
         expect_at_least(len(data), size)
     else:
         expect_unpacked(size, len(data))
+    separate = page.value(tag.PLANAR_CONFIGURATION, 1) == 2 and samples > 1
     if compression not in _DECODERS:
-        image = _by_tifffile(data, _COMPRESSIONS.get(compression, f"method {compression}"))
-    else:
-        image = _from_segments(page, rows, cols, samples, dtype)
-    if image.shape[:2] != (rows, cols) and samples > 1:
-        image = np.moveaxis(image, 0, -1)
-    return image[..., 0] if image.ndim == 3 and samples == 1 else image
+        raise ValueError(f"it is compressed by {_OTHERS.get(compression, f'method {compression}')}; use deflate or LZW")
+    image = _from_segments(page, rows, cols, samples, separate, dtype)
+    if page.value(tag.PHOTOMETRIC, 1) == _RGB and not (image < 0).any():
+        raise _colours("RGB")  # half of all points have a coordinate below zero
+    return image.reshape((rows, cols) if samples == 1 else (rows, cols, samples))
+
+
+def _colours(photometric: str) -> ValueError:
+    return ValueError(
+        f"it holds colours ({photometric}), no range image; store points with photometric 'minisblack', as "
+        "imwriteRange does, or pass them as an array"
+    )
+
+
+def _expect_no_colours(page: Page) -> None:
+    """Refuses colours. Points that tifffile has stored as RGB, its former default, are in the order x, y, z.
+
+    Others may have exchanged the first and the last channel, as cv2.imwrite does.
+    """
+    photometric = page.value(tag.PHOTOMETRIC, 1)
+    by_tifffile = page.text(tag.SOFTWARE).startswith("tifffile") if tag.SOFTWARE in page else False
+    floats = set(page.values(tag.SAMPLE_FORMAT, (1,)).tolist()) == {3}
+    if photometric in _COLOURS and not (photometric == _RGB and by_tifffile and floats):
+        raise _colours(_COLOURS[photometric])
 
 
 def _sample_type(page: Page) -> tuple[np.dtype, int]:
     """The type of a sample, and how many there are a pixel."""
-    photometric, samples = page.value(tag.PHOTOMETRIC, 1), page.value(tag.SAMPLES_PER_PIXEL, 1)
+    samples = page.value(tag.SAMPLES_PER_PIXEL, 1)
     bits = set(page.values(tag.BITS_PER_SAMPLE, (1,)).tolist())
     kinds = set(page.values(tag.SAMPLE_FORMAT, (1,)).tolist())
-    if photometric in _PHOTOMETRICS:
-        raise ValueError(
-            f"it holds colours ({_PHOTOMETRICS[photometric]}), no range image; store points with photometric "
-            "'minisblack', as tifffile and imwriteRange do, or pass them as an array"
-        )
     if len(bits) != 1 or len(kinds) != 1 or not kinds <= _KINDS.keys():
         raise ValueError(f"it holds samples of {sorted(bits)} bits of the formats {sorted(kinds)}")
     (width,), (kind,) = bits, kinds
@@ -79,11 +98,10 @@ def _sample_type(page: Page) -> tuple[np.dtype, int]:
     return np.dtype(f"{page.order}{_KINDS[kind]}{width // 8}"), samples
 
 
-def _from_segments(page: Page, rows: int, cols: int, samples: int, dtype: np.dtype) -> np.ndarray:
+def _from_segments(page: Page, rows: int, cols: int, samples: int, separate: bool, dtype: np.dtype) -> np.ndarray:
     """An image of shape (rows, cols, samples) from its strips or tiles."""
     if page.value(tag.FILL_ORDER, 1) != 1:
         raise ValueError("the bits of its bytes are in reverse order")
-    separate = page.value(tag.PLANAR_CONFIGURATION, 1) == 2 and samples > 1
     planes, depth = (samples, 1) if separate else (1, samples)
     tiled = tag.TILE_OFFSETS in page
     if tiled:
@@ -107,17 +125,17 @@ def _from_segments(page: Page, rows: int, cols: int, samples: int, dtype: np.dty
         segment_rows = height if tiled else min(height, rows - top)
         expect_at_least(len(page.data), offset + count)
         packed = np.frombuffer(page.data, np.uint8, count, offset)
-        size = segment_rows * width * depth * dtype.itemsize
-        plain = decode(packed, size)
-        if len(plain) < size:
-            raise ValueError(f"a strip or tile unpacks to {len(plain)} bytes where {size} are needed")
-        segment = _unpredicted(plain, (segment_rows, width, depth), dtype, predictor)
+        shape = (segment_rows, width, depth)
+        plain = decode(packed, shape, dtype)
+        if len(plain) < _size(shape, dtype):
+            raise ValueError(f"a strip or tile unpacks to {len(plain)} bytes where {_size(shape, dtype)} are needed")
+        segment = _unpredicted(plain, shape, dtype, predictor)
         target = image[top : top + segment_rows, left : left + width, plane : plane + depth]
         target[...] = segment[: target.shape[0], : target.shape[1]]
     return image
 
 
-def _unpredicted(plain: bytes, shape: tuple[int, int, int], dtype: np.dtype, predictor: int) -> np.ndarray:
+def _unpredicted(plain: bytes | memoryview, shape: Shape, dtype: np.dtype, predictor: int) -> np.ndarray:
     """Samples from what the predictor left of them: differences along the row, or of the bytes of floats."""
     rows, cols, depth = shape
     if predictor == 1:
@@ -135,26 +153,35 @@ def _unpredicted(plain: bytes, shape: tuple[int, int, int], dtype: np.dtype, pre
     raise ValueError(f"it has the predictor {predictor} on {dtype}")
 
 
-def _stored(packed: np.ndarray, size: int) -> bytes:
-    return packed[:size].data
+def _size(shape: Shape, dtype: np.dtype) -> int:
+    return math.prod(shape) * dtype.itemsize
 
 
-def _lzw(packed: np.ndarray, size: int) -> bytes:
-    plain = np.empty(size, np.uint8)
+# Each decoder returns the bytes of a strip or tile of this shape and type; fewer where its data ends.
+
+
+def _stored(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> memoryview:
+    return packed[: _size(shape, dtype)].data
+
+
+def _lzw(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> memoryview:
+    plain = np.empty(_size(shape, dtype), np.uint8)
     return plain[: _core.lzw_unpack(packed, plain)].data
 
 
-def _deflate(packed: np.ndarray, size: int) -> bytes:
-    return zlib.decompressobj().decompress(packed.data, size)
+def _deflate(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> bytes:
+    return zlib.decompressobj().decompress(packed.data, _size(shape, dtype))
 
 
-def _lzma(packed: np.ndarray, size: int) -> bytes:
-    return lzma.LZMADecompressor(memlimit=2**28).decompress(packed.tobytes(), size)
+def _lzma(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> bytes:
+    import lzma  # not every Python has it
+
+    return lzma.LZMADecompressor(memlimit=2**28).decompress(packed.tobytes(), _size(shape, dtype))
 
 
-def _pack_bits(packed: np.ndarray, size: int) -> bytes:
+def _pack_bits(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> bytes:
     """Runs: a byte n below 128 announces n + 1 bytes, one above says that the next is repeated 257 - n times."""
-    data, plain, at = packed.tobytes(), bytearray(), 0
+    data, plain, at, size = packed.tobytes(), bytearray(), 0, _size(shape, dtype)
     while at < len(data) and len(plain) < size:
         head = data[at]
         if head < 128:
@@ -168,27 +195,48 @@ def _pack_bits(packed: np.ndarray, size: int) -> bytes:
     return bytes(plain)
 
 
-_DECODERS = {
-    _UNCOMPRESSED: _stored,
-    _LZW: _lzw,
-    _DEFLATE: _deflate,
-    _OLD_DEFLATE: _deflate,
-    _PACK_BITS: _pack_bits,
-    _LZMA: _lzma,
-}
+def _zstd(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> bytes:
+    return _imagecodecs("ZSTD").zstd_decode(packed.tobytes(), out=_size(shape, dtype))
 
 
-def _by_tifffile(data: bytes, compression: str) -> np.ndarray:
+def _lerc(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> bytes:
+    """Perhaps packed again by deflate or ZSTD. What its mask leaves out is NaN, of integers 0."""
+    codecs = _imagecodecs("LERC")
+    blob = packed.tobytes()
+    if blob[:1] == b"\x78":
+        blob = zlib.decompressobj().decompress(blob, 2 * _size(shape, dtype) + 2**16)
+    elif blob[:4] == b"\x28\xb5\x2f\xfd":
+        blob = codecs.zstd_decode(blob, out=2 * _size(shape, dtype) + 2**16)
+    plain = np.empty(shape if shape[2] > 1 else shape[:2], dtype.newbyteorder("="))
+    plain, mask = codecs.lerc_decode(blob, masks=True, out=plain)
+    if mask is not None and not mask.all():
+        plain[~mask] = np.nan if dtype.kind == "f" else 0
+    return plain.astype(dtype).tobytes()
+
+
+def _imagecodecs(compression: str) -> ModuleType:
     try:
-        import imagecodecs  # noqa: F401
-        import tifffile
+        import imagecodecs
     except ImportError:
-        raise ValueError(
+        raise ImportError(
             f"it is compressed by {compression}, for which imagecodecs is needed: pip install 'rangeedge[tiff]', or "
             "store it uncompressed or by deflate"
         ) from None
-    with tifffile.TiffFile(io.BytesIO(data)) as file:
-        return file.pages.first.asarray(maxworkers=1)
+    return imagecodecs
+
+
+# By the number of the compression.
+_DECODERS: dict[int, Callable[[np.ndarray, Shape, np.dtype], bytes | memoryview]] = {
+    _UNCOMPRESSED: _stored,
+    5: _lzw,
+    8: _deflate,
+    32946: _deflate,
+    32773: _pack_bits,
+    34925: _lzma,
+    34887: _lerc,
+    50000: _zstd,
+}
+_OTHERS = {6: "JPEG", 7: "JPEG", 34712: "JPEG 2000", 50001: "WebP", 50002: "JPEG XL"}
 
 
 def write_tiff(src: np.ndarray) -> bytes:

@@ -1,23 +1,31 @@
-// Unpacking of compressed files. The sizes of outputs are the caller's to check.
+// What is slow in Python about reading files. The sizes of outputs are the caller's to check.
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdint>
 
 #include "io/lzf.hpp"
 #include "io/lzw.hpp"
+#include "io/ply.hpp"
 #include "io/png.hpp"
 #include "python/arrays.hpp"
 
 namespace rangeedge::python {
 namespace {
 
-using OutValues = nb::ndarray<std::uint8_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+template <class T>
+using OutValues = nb::ndarray<T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 
-bool bound_lzf_unpack(const Values<std::uint8_t>& packed, const OutValues& out) {
+bool bound_lzf_unpack(const Values<std::uint8_t>& packed, const OutValues<std::uint8_t>& out) {
     return lzf_unpack(packed.data(), packed.shape(0), out.data(), out.shape(0));
 }
 
-std::size_t bound_lzw_unpack(const Values<std::uint8_t>& packed, const OutValues& out) {
+std::size_t bound_lzw_unpack(const Values<std::uint8_t>& packed, const OutValues<std::uint8_t>& out) {
     return lzw_unpack(packed.data(), packed.shape(0), out.data(), out.shape(0));
+}
+
+std::size_t bound_ply_first_items(const Values<std::uint8_t>& data, std::size_t length_bytes, bool big_endian,
+                                  std::size_t item_bytes, const OutValues<std::int64_t>& first) {
+    return ply_first_items(data.data(), data.shape(0), first.shape(0), {length_bytes, big_endian, item_bytes},
+                           first.data());
 }
 
 bool bound_png_unfilter(const Values<std::uint8_t>& filtered, std::size_t pixel_bytes,
@@ -29,6 +37,8 @@ bool bound_png_unfilter(const Values<std::uint8_t>& filtered, std::size_t pixel_
 
 void bind_io(nb::module_& m) {
     m.def("lzf_unpack", &bound_lzf_unpack, array("packed"), array("out"), Unlocked());
+    m.def("ply_first_items", &bound_ply_first_items, array("data"), "length_bytes"_a, "big_endian"_a, "item_bytes"_a,
+          array("first"), Unlocked());
     m.def("png_unfilter", &bound_png_unfilter, array("filtered"), "pixel_bytes"_a, array("out"), Unlocked());
     m.def("lzw_unpack", &bound_lzw_unpack, array("packed"), array("out"), Unlocked());
 }
