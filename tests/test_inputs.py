@@ -86,6 +86,9 @@ SECOND = METRES_PER_DEGREE / 3600
 TURNED = (34264, "d", 16, (3, 4, 0, 7, 4, -3, 0, 9, *[0] * 7, 1), True)
 CENTIMETRES = np.where(MILLIMETRES == 0, np.int16(-9999), HEIGHTS)
 UNHURT = np.where(MILLIMETRES == 0, np.int16(-32768), HEIGHTS)
+METADATA = '<Item name="OFFSET" sample="0" role="offset">7</Item><Item name="SCALE" role="scale">0.5</Item>'
+SCALE = (42112, "s", 0, f"<GDALMetadata>{METADATA}</GDALMetadata>", True)
+UNHURT_METRES = np.where(MILLIMETRES == 0, NAN, HEIGHTS / 2 + 7)
 POINTS64 = POINTS.astype(float)
 CONTIG = {"planarconfig": "contig"}
 HALF_CELLS = {"pixelSize": (0.5, 0.25), "heightMap": True}
@@ -153,6 +156,10 @@ MAIN_TIFF = [
         {"pixelSize": (SECOND * np.cos(MIDDLE), SECOND), "heightMap": True},
     ),
     Input("GeoTIFF turned", tiff(HOLES, extratags=[TURNED]), HOLES, {"pixelSize": (5, 5), "heightMap": True}),
+    Input("GDAL scale and offset", tiff(CENTIMETRES, extratags=[nodata("-9999"), SCALE]), UNHURT_METRES),
+    Input(
+        "GDAL scale garbled", tiff(CENTIMETRES, extratags=[(42112, "s", 0, 'role="scale">a<', True)]), "scale is 'a'"
+    ),
     Input("pixel scale without a place", tiff(HOLES, extratags=geo()[:1]), HOLES),
 ]
 

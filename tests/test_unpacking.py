@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
 from rangeedge import _core
+from rangeedge.io import source
 
 UNTOUCHED = 0xA5
 
@@ -214,10 +215,17 @@ def test_png_filters(data):
     assert not _core.png_unfilter(filtered.ravel(), 2, out)
 
 
-def test_zlib_is_bounded():
-    """What the readers rely on: a decompressor stops at the size that it is given."""
-    bomb = zlib.compress(bytes(10**7))
-    assert len(zlib.decompressobj().decompress(bomb, 100)) == 100
+def test_inflate(monkeypatch):
+    plain = np.random.default_rng(0).integers(0, 9, 10_000, dtype=np.uint8).tobytes()
+    packed = zlib.compress(plain)
+    for at_a_time in (1, 7, 1000, 10**6):
+        monkeypatch.setattr(source, "_AT_A_TIME", at_a_time)
+        for size in (0, 1, 6, 7, 8, 9999, 10_000, 10_001):
+            assert source.inflate(packed, size) == plain[:size]
+    assert plain.startswith(source.inflate(packed[:-100], 10_000))
+    assert 0 < len(source.inflate(packed[:-100], 10_000)) < 10_000
+    with pytest.raises(zlib.error):
+        source.inflate(b"no zlib", 10)
 
 
 def slow_first_items(data, count, length_bytes, big_endian, item_bytes):

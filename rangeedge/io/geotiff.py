@@ -5,6 +5,7 @@ Tags: OGC 19-008r4, GeoTIFF 1.1, and ``GDAL_NODATA`` of the Geospatial Data Abst
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ _GEOGRAPHIC, _PIXEL_IS_POINT = 2, 2
 def described_by(page: Page, image: np.ndarray) -> RangeImage:
     """The image, pixels without data marked (floats NaN, integers the value that `without_data` names)."""
     image = _without_data(image, page.text(tag.GDAL_NODATA) if tag.GDAL_NODATA in page else "")
+    image = _scaled(image, page.text(tag.GDAL_METADATA) if tag.GDAL_METADATA in page else "")
     georeference = _georeference(page)
     if georeference is None or image.ndim != 2:
         return RangeImage(image, georeference=georeference)
@@ -50,6 +52,25 @@ def _without_data(image: np.ndarray, nodata: str) -> np.ndarray:
         if info.min <= value <= info.max:
             image[image == int(value)] = info.min
     return image
+
+
+def _scaled(image: np.ndarray, metadata: str) -> np.ndarray:
+    """Values in their unit: those stored, times GDAL's scale, plus its offset; as floats where these change them."""
+    values = {"scale": 1.0, "offset": 0.0}
+    for role in values:
+        for found in set(re.findall(rf'role="{role}"[^<>]*>([^<]*)<', metadata)):
+            try:
+                values[role] = float(found)
+            except ValueError:
+                raise ValueError(f"its {role} is {found[:40]!r}, no number") from None
+    if values == {"scale": 1.0, "offset": 0.0}:
+        return image
+    if not all(np.isfinite(value) for value in values.values()) or values["scale"] == 0:
+        raise ValueError(f"its scale {values['scale']} and offset {values['offset']} make no lengths")
+    lengths = image.astype(np.float64) * values["scale"] + values["offset"]
+    if image.dtype.kind != "f":
+        lengths[image == np.iinfo(image.dtype).min] = np.nan
+    return lengths
 
 
 def _georeference(page: Page) -> np.ndarray | None:

@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from .. import _core
-from .source import HEADER_LIMIT, expect_at_least, expect_pixels, expect_unpacked
+from .source import HEADER_LIMIT, expect_at_least, expect_pixels, expect_unpacked, inflate
 from .text import numbers
 
 _PNG_COLOURS = {0: "grey values", 2: "colours", 3: "a palette", 4: "opacity", 6: "colours"}  # by colour type
@@ -30,7 +30,7 @@ def read_png(data: bytes) -> np.ndarray:
     picture = np.empty((height, width), ">u2")
     passes = [p for part in (_ADAM7 if interlaced else _WHOLE) if (p := picture[part]).size]
     size = sum(rows * (1 + 2 * cols) for rows, cols in (p.shape for p in passes))
-    filtered = np.frombuffer(zlib.decompressobj().decompress(packed, size), np.uint8)
+    filtered = np.frombuffer(inflate(packed, size), np.uint8)
     expect_at_least(len(filtered), size)
     at = 0
     for part in passes:

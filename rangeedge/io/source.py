@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import stat
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, BinaryIO
@@ -21,6 +22,8 @@ HEADER_LIMIT = 2**16
 PIXEL_LIMIT = 2**28
 UNPACKED_FREELY = 2**28
 UNPACKED_RATIO = 100
+
+_AT_A_TIME = 2**24  # bytes that are unpacked in one call
 
 _KINDS = (
     (stat.S_ISDIR, "a directory"),
@@ -104,3 +107,16 @@ def expect_size(found: int, needed: int, unit: str = "bytes") -> None:
 def expect_at_least(found: int, needed: int, unit: str = "bytes") -> None:
     if found < needed:
         raise ValueError(f"it is truncated: {found} {unit} where {needed} are needed")
+
+
+def inflate(packed: bytes | memoryview, size: int) -> bytearray:
+    """The first `size` bytes, or as many as there are, of what zlib has packed.
+
+    Some at a time: Python looks for an interrupt in between.
+    """
+    stream = zlib.decompressobj()
+    plain = bytearray()
+    while packed and len(plain) < size:
+        plain += stream.decompress(packed, min(_AT_A_TIME, size - len(plain)))
+        packed = stream.unconsumed_tail
+    return plain

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 import struct
-import zlib
 from collections.abc import Callable
 from types import ModuleType
 
@@ -18,7 +17,7 @@ from .. import _core
 from . import tiff_tags as tag
 from .geotiff import described_by
 from .range_image import RangeImage
-from .source import expect_at_least, expect_pixels, expect_unpacked
+from .source import expect_at_least, expect_pixels, expect_unpacked, inflate
 from .tiff_tags import Page
 
 _UNCOMPRESSED = 1
@@ -135,7 +134,7 @@ def _from_segments(page: Page, rows: int, cols: int, samples: int, separate: boo
     return image
 
 
-def _unpredicted(plain: bytes | memoryview, shape: Shape, dtype: np.dtype, predictor: int) -> np.ndarray:
+def _unpredicted(plain: bytes | bytearray | memoryview, shape: Shape, dtype: np.dtype, predictor: int) -> np.ndarray:
     """Samples from what the predictor left of them: differences along the row, or of the bytes of floats."""
     rows, cols, depth = shape
     if predictor == 1:
@@ -169,8 +168,8 @@ def _lzw(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> memoryview:
     return plain[: _core.lzw_unpack(packed, plain)].data
 
 
-def _deflate(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> bytes:
-    return zlib.decompressobj().decompress(packed.data, _size(shape, dtype))
+def _deflate(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> bytearray:
+    return inflate(packed.data, _size(shape, dtype))
 
 
 def _lzma(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> bytes:
@@ -204,7 +203,7 @@ def _lerc(packed: np.ndarray, shape: Shape, dtype: np.dtype) -> bytes:
     codecs = _imagecodecs("LERC")
     blob = packed.tobytes()
     if blob[:1] == b"\x78":
-        blob = zlib.decompressobj().decompress(blob, 2 * _size(shape, dtype) + 2**16)
+        blob = bytes(inflate(blob, 2 * _size(shape, dtype) + 2**16))
     elif blob[:4] == b"\x28\xb5\x2f\xfd":
         blob = codecs.zstd_decode(blob, out=2 * _size(shape, dtype) + 2**16)
     plain = np.empty(shape if shape[2] > 1 else shape[:2], dtype.newbyteorder("="))
@@ -226,7 +225,7 @@ def _imagecodecs(compression: str) -> ModuleType:
 
 
 # By the number of the compression.
-_DECODERS: dict[int, Callable[[np.ndarray, Shape, np.dtype], bytes | memoryview]] = {
+_DECODERS: dict[int, Callable[[np.ndarray, Shape, np.dtype], bytes | bytearray | memoryview]] = {
     _UNCOMPRESSED: _stored,
     5: _lzw,
     8: _deflate,

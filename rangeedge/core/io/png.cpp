@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "png.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 
 namespace rangeedge {
@@ -9,8 +10,16 @@ namespace {
 
 int paeth(int a, int b, int c) {
     const int from_a = std::abs(b - c), from_b = std::abs(a - c), from_c = std::abs(a + b - 2 * c);
-    if (from_a <= from_b && from_a <= from_c) return a;
-    return from_b <= from_c ? b : c;
+    const int a_or_b = from_b < from_a ? b : a;
+    return from_c < std::min(from_a, from_b) ? c : a_or_b;
+}
+
+// What a byte is stored less of.
+int prediction(int filter, int a, int b, int c) {
+    if (filter == 1) return a;
+    if (filter == 2) return b;
+    if (filter == 3) return (a + b) / 2;
+    return filter == 4 ? paeth(a, b, c) : 0;
 }
 
 }  // namespace
@@ -27,24 +36,7 @@ bool png_unfilter(const std::uint8_t* filtered, std::size_t rows, std::size_t ro
             const int a = first ? 0 : out[i - pixel_bytes];
             const int b = above ? above[i] : 0;
             const int c = first || !above ? 0 : above[i - pixel_bytes];
-            int prediction = 0;
-            switch (filter) {
-                case 1:
-                    prediction = a;
-                    break;
-                case 2:
-                    prediction = b;
-                    break;
-                case 3:
-                    prediction = (a + b) / 2;
-                    break;
-                case 4:
-                    prediction = paeth(a, b, c);
-                    break;
-                default:
-                    break;
-            }
-            out[i] = static_cast<std::uint8_t>(stored[i] + prediction);
+            out[i] = static_cast<std::uint8_t>(stored[i] + prediction(filter, a, b, c));
         }
     }
     return true;
