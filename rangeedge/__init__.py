@@ -39,6 +39,7 @@ from ._constants import (
     SALIENCE_MULTIPLICATIVE,
     THIN_ITERATIVE,
     THIN_LEE,
+    THIN_MEDIAL,
     THIN_SKELETON,
 )
 from .closure import closeContours
@@ -121,6 +122,7 @@ __all__ = [  # noqa: RUF022
     "THIN_SKELETON",
     "THIN_LEE",
     "THIN_ITERATIVE",
+    "THIN_MEDIAL",
     "SALIENCE_MULTIPLICATIVE",
     "SALIENCE_ADDITIVE",
 ]

@@ -58,6 +58,9 @@ def edge_strength(
     kind: NDArray[np.uint8],
     significance: NDArray[np.float32],
 ) -> None: ...
+def thin_lines(
+    edges: NDArray[np.uint8], preferred: NDArray[np.uint8] | None, spur_length: int, thin: NDArray[np.uint8]
+) -> None: ...
 def long_components(edges: NDArray[np.uint8], min_length: int, kept: NDArray[np.uint8]) -> None: ...
 def distance_transform(
     edges: NDArray[np.uint8], distance: NDArray[np.float32], labels: NDArray[np.int32] | None, threads: int

@@ -12,6 +12,7 @@
 #include "noise/statistics.hpp"
 #include "scanline/split.hpp"
 #include "edges/select.hpp"
+#include "edges/thin.hpp"
 #include "base/simd.hpp"
 
 namespace nb = nanobind;
@@ -168,6 +169,14 @@ void bind_edges(nb::module_& m) {
                             kept.data());
         },
         "edges"_a.noconvert(), "min_length"_a, "kept"_a.noconvert());
+    m.def(
+        "thin_lines",
+        [](In<std::uint8_t> edges, std::optional<In<std::uint8_t>> preferred, int spur_length, Out<std::uint8_t> thin) {
+            nb::gil_scoped_release release;
+            thin_lines(edges.data(), preferred ? preferred->data() : nullptr, static_cast<int>(edges.shape(0)),
+                       static_cast<int>(edges.shape(1)), spur_length, thin.data());
+        },
+        "edges"_a.noconvert(), "preferred"_a.noconvert().none(), "spur_length"_a, "thin"_a.noconvert());
     define<float>(m);
     define<double>(m);
     define_inverse<float, float>(m);
