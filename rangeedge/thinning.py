@@ -69,8 +69,8 @@ def thinEdges(
     >>> edges[1:3] = 255
     >>> thinEdges(edges)
     array([[  0,   0,   0,   0,   0,   0],
-           [  0,   0,   0,   0,   0,   0],
            [255, 255, 255, 255, 255, 255],
+           [  0,   0,   0,   0,   0,   0],
            [  0,   0,   0,   0,   0,   0]], dtype=uint8)
     """
     func = "thinEdges"

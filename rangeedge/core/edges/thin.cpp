@@ -7,7 +7,7 @@
 //    by now and stays for good, as do pixels with a single neighbour, the ends of lines. So every pixel is looked at in
 //    one round alone, and the time is proportional to their number.
 // 2. Narrowing. The lines may still be two or three pixels wide, since the cliques stayed whole. Pixels at the fringe of
-//    the band go before inner ones; among equals a side has to be chosen: first north, then south, west, east.
+//    the band go before inner ones; among equals a side has to be chosen: first south, then north, east, west.
 // 3. Pruning. Branches with a free end that hardly stand out of the band go, the shortest first. What is left when the
 //    last junction has gone is a line with two ends and no branch.
 // 4. Drawing ends. Peeling takes as much off the end of a band as off its sides, or runs into one of its corners. Lines
@@ -234,7 +234,7 @@ private:
             while (by_depth_[least].empty()) ++least;
             group.clear();
             group.swap(by_depth_[least]);
-            for (const int from : {north, south, west, east}) {
+            for (const int from : {south, north, east, west}) {
                 side.clear();
                 for (const int p : group)
                     if (!is_set(p + offsets_[at(from)]) && from_here(ring<on>(p), from)) side.push_back(p);
