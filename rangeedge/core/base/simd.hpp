@@ -23,15 +23,15 @@
     RANGEEDGE_VERSION(, 16, result, name, parameters, arguments)
 #elif RANGEEDGE_WIDEST == 32
 #define RANGEEDGE_WIDE __attribute__((target_clones("avx2", "default")))
-#define RANGEEDGE_VERSIONS(result, name, parameters, arguments)                                              \
-    RANGEEDGE_VERSION(__attribute__((target("avx2"))), 32, result, name, parameters, arguments)              \
+#define RANGEEDGE_VERSIONS(result, name, parameters, arguments)                                 \
+    RANGEEDGE_VERSION(__attribute__((target("avx2"))), 32, result, name, parameters, arguments) \
     RANGEEDGE_VERSION(__attribute__((target("default"))), 16, result, name, parameters, arguments)
 #else
 #define RANGEEDGE_WIDE __attribute__((target_clones("avx512f", "avx2", "default")))
-#define RANGEEDGE_VERSIONS(result, name, parameters, arguments)                                              \
-    RANGEEDGE_VERSION(__attribute__((target("avx512f,avx512bw,avx512dq,avx512vl"))), 64, result, name,       \
-                      parameters, arguments)                                                                 \
-    RANGEEDGE_VERSION(__attribute__((target("avx2"))), 32, result, name, parameters, arguments)              \
+#define RANGEEDGE_VERSIONS(result, name, parameters, arguments)                                                    \
+    RANGEEDGE_VERSION(__attribute__((target("avx512f,avx512bw,avx512dq,avx512vl"))), 64, result, name, parameters, \
+                      arguments)                                                                                   \
+    RANGEEDGE_VERSION(__attribute__((target("avx2"))), 32, result, name, parameters, arguments)                    \
     RANGEEDGE_VERSION(__attribute__((target("default"))), 16, result, name, parameters, arguments)
 #endif
 #define RANGEEDGE_VERSION(target, bytes, result, name, parameters, arguments) \
@@ -75,43 +75,43 @@ struct Lanes {
     RANGEEDGE_INLINE void store(T* values) const {
         for (int p = 0; p < parts; ++p) std::memcpy(values + p * width, &part[p], bytes);
     }
-#define RANGEEDGE_OPERATOR(op)                                                  \
+#define RANGEEDGE_OPERATOR(op, assignment)                                      \
     friend RANGEEDGE_INLINE Lanes operator op(const Lanes& a, const Lanes& b) { \
         Lanes r;                                                                \
         for (int p = 0; p < parts; ++p) r.part[p] = a.part[p] op b.part[p];     \
         return r;                                                               \
     }                                                                           \
-    RANGEEDGE_INLINE Lanes& operator op##=(const Lanes & b) { return *this = *this op b; }
-    RANGEEDGE_OPERATOR(+)
-    RANGEEDGE_OPERATOR(-)
-    RANGEEDGE_OPERATOR(*)
-    RANGEEDGE_OPERATOR(&)  // of ints
-    RANGEEDGE_OPERATOR(|)
-    RANGEEDGE_OPERATOR(^)
+    RANGEEDGE_INLINE Lanes& operator assignment(const Lanes& b) { return *this = *this op b; }
+    RANGEEDGE_OPERATOR(+, +=)
+    RANGEEDGE_OPERATOR(-, -=)
+    RANGEEDGE_OPERATOR(*, *=)
+    RANGEEDGE_OPERATOR(&, &=)  // of ints
+    RANGEEDGE_OPERATOR(|, |=)
+    RANGEEDGE_OPERATOR(^, ^=)
 #undef RANGEEDGE_OPERATOR
 
-    // Joins the lanes two by two, each one of the first half with that of the second half, and so on. `join` takes
+    // Joins the lanes, two by two, each one of the first half with that of the second half, and so on. `join` takes
     // vectors as well as numbers.
     template <class Join>
-    RANGEEDGE_INLINE T joined(Join&& join) const {
+    RANGEEDGE_INLINE T reduce(Join&& join) const {
         Lanes r = *this;
         for (int half = parts / 2; half > 0; half /= 2)
             for (int p = 0; p < half; ++p) r.part[p] = join(r.part[p], r.part[p + half]);
-        return joined_halves<bytes>(r.part[0], join);
+        return reduce_halves<bytes>(r.part[0], join);
     }
     RANGEEDGE_INLINE T sum() const {
-        return joined([](auto a, auto b) RANGEEDGE_ALWAYS { return a + b; });
+        return reduce([](auto a, auto b) RANGEEDGE_ALWAYS { return a + b; });
     }
 
 private:
     template <int size, class Join>
-    static RANGEEDGE_INLINE T joined_halves(const Vector& v, Join&& join) {
+    static RANGEEDGE_INLINE T reduce_halves(const Vector& v, Join&& join) {
         if constexpr (size > 16) {
             typedef Lanes<T, size / 2> Half;
             typename Half::Vector low, high;
             std::memcpy(&low, &v, sizeof low);
             std::memcpy(&high, reinterpret_cast<const char*>(&v) + sizeof low, sizeof high);
-            return Half::template joined_halves<size / 2>(join(low, high), join);
+            return Half::template reduce_halves<size / 2>(join(low, high), join);
         } else if constexpr (width == 4) {
             return join(join(v[0], v[2]), join(v[1], v[3]));
         } else {
@@ -156,20 +156,22 @@ RANGEEDGE_INLINE Floats<bytes> from_bits(const Ints<bytes>& a) {
 }
 
 template <int bytes>
-RANGEEDGE_INLINE Floats<bytes> magnitude(const Floats<bytes>& a) {
+RANGEEDGE_INLINE Floats<bytes> abs(const Floats<bytes>& a) {
     return from_bits(bits(a) & Ints<bytes>::all(0x7fffffff));
 }
 
-// The first n lanes, and 0 in the others.
+// The first n lanes, and 0 in the others. The mask is a stretch of the array below that begins n words before the clear
+// ones.
 template <class T, int bytes>
-RANGEEDGE_INLINE Lanes<T, bytes> first_lanes(const Lanes<T, bytes>& a, int n) {
+RANGEEDGE_INLINE Lanes<T, bytes> keep_first(const Lanes<T, bytes>& a, int n) {
     typedef std::conditional_t<sizeof(T) == 4, std::int32_t, std::int64_t> Bits;
     using M = Lanes<Bits, bytes>;
     constexpr int count = M::count;
-    alignas(64) static constexpr Bits kept[32] = {-1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1, -1};
+    alignas(64) static constexpr Bits set_then_clear[32] = {-1, -1, -1, -1, -1, -1, -1, -1,
+                                                            -1, -1, -1, -1, -1, -1, -1, -1};
     M m;
     std::memcpy(&m, &a, sizeof m);
-    m &= M::load(kept + 16 - std::min(n, count));
+    m &= M::load(set_then_clear + 16 - std::min(n, count));
     Lanes<T, bytes> r;
     std::memcpy(&r, &m, sizeof r);
     return r;
@@ -177,7 +179,7 @@ RANGEEDGE_INLINE Lanes<T, bytes> first_lanes(const Lanes<T, bytes>& a, int n) {
 
 // All bits where a < 0, else none.
 template <int bytes>
-RANGEEDGE_INLINE Ints<bytes> negative(const Ints<bytes>& a) {
+RANGEEDGE_INLINE Ints<bytes> sign_mask(const Ints<bytes>& a) {
     Ints<bytes> r;
     for (int p = 0; p < r.parts; ++p) r.part[p] = a.part[p] >> 31;
     return r;

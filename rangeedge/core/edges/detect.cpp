@@ -1,170 +1,135 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "edges/candidate.hpp"
+#include "edges/detect.hpp"
 
 #include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <limits>
 
-#include "scanline/approximation.hpp"
-#include "scanline/line.hpp"
-#include "edges/neighbours.hpp"
 #include "base/parallel.hpp"
+#include "edges/cells.hpp"
+#include "edges/neighbours.hpp"
+#include "edges/position.hpp"
+#include "edges/strength.hpp"
+#include "scanline/approximation.hpp"
+#include "scanline/reader.hpp"
 
 namespace rangeedge {
 namespace {
 
-constexpr double lone_significance = 3;  // of a candidate by itself, before its neighbours are asked
-constexpr double jump_alone = 12;        // significance of a jump
-constexpr double jump_tolerances = 2;    // what tells a jump from the approximation's own error
-
-// Where an edge is: between two samples, at an abscissa, also counted in samples.
-struct Cut {
-    int before, after;
-    double abscissa, sample;
-    double shift;  // samples that it was moved
-    bool meeting;  // the two curves meet here: no jump
-};
+constexpr double lone_significance = 3;   // standard deviations that a candidate needs by itself, before its neighbours
+constexpr double jump_significance = 12;  // standard deviations that a jump needs by itself
+constexpr double jump_tolerances = 2;     // tolerances of splitting that a jump exceeds, the error of approximation
 
 template <class T>
 class LineDetector {
 public:
-    LineDetector(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters, int direction)
-        : cols_(image.cols), parameters_(parameters), reader_(image, noise, parameters), direction_(direction) {}
+    LineDetector(const Frame<T>& frame, const ScanLineOptions& options, int direction)
+        : options_(options), reader_(frame, options), direction_(direction) {}
 
     void read(int first, int count, Strip<T>& strip) const { reader_.read(direction_, first, count, strip); }
 
     void detect(const Strip<T>& strip, Approximator<T>& approximator, std::vector<Candidate>& candidates) const {
-        approximator.approximate(strip);  // P 4.1
-        for (std::size_t i = 0; i < strip.lines.size(); ++i) detect(strip.lines[i], approximator.line(i), candidates);
+        approximator.approximate(strip);  // paper, 4.1
+        for (std::size_t i = 0; i < strip.lines.size(); ++i)
+            detect(strip.lines[i], approximator.line(static_cast<std::ptrdiff_t>(i)), candidates);
     }
 
 private:
     void detect(const Line<T>& line, const Approximation& a, std::vector<Candidate>& candidates) const {
-        for (std::size_t i = 0; i + 1 < a.count; ++i) {
-            if (a.segments[i + 1].first - a.segments[i].last - 1 > parameters_.max_gap) continue;
-            const Cut cut = adapted_position(line, a, i);                                    // P 4.2, Fig. 5
-            const Candidate candidate = measure(line, a.curves[i], a.curves[i + 1], cut);    // P 4.2, Fig. 4
+        for (std::ptrdiff_t i = 0; i + 1 < a.count; ++i) {
+            if (a.segments[i + 1].first - a.segments[i].last - 1 > options_.max_gap) continue;
+            const Position edge = adapted_position(line, a, i, options_.max_shift);         // paper, 4.2, Fig. 5
+            const Candidate candidate = measure(line, a.curves[i], a.curves[i + 1], edge);  // paper, 4.2, Fig. 4
             if (candidate.jump > 0 || candidate.crease > 0) candidates.push_back(candidate);
         }
     }
 
-    // The intersection of the two curves nearest the cut becomes the edge position if it is within reach and the
-    // samples it passes over fit the curve to which they then belong.
-    Cut adapted_position(const Line<T>& line, const Approximation& a, std::size_t i) const {
-        const Segment &left = a.segments[i], &right = a.segments[i + 1];
-        const double xa = line.abscissa(left.last), xb = line.abscissa(right.first);
-        const Cut cut{left.last, right.first, (xa + xb) / 2, (left.last + right.first) / 2.0, 0, false};
-        const auto meeting = [&](int before, int after, double x, double sample) {
-            const double shift = sample - cut.sample;
-            return std::abs(shift) > parameters_.max_shift ? cut : Cut{before, after, x, sample, shift, true};
-        };
-        const double reach = line.x ? HUGE_VAL : parameters_.max_shift + 1;
-        double x = 0;
-        if (!(parameters_.max_shift > 0)) return cut;
-        if (!intersection(a.curves[i], a.curves[i + 1], cut.abscissa, reach, x)) return cut;
-        if (x >= xa && x <= xb)
-            return meeting(left.last, right.first, x, left.last + (right.first - left.last) * (x - xa) / (xb - xa));
-        const bool leftward = x < xa;
-        const int step = leftward ? -1 : 1, begin = leftward ? left.last : right.first;
-        const int end = leftward ? left.first : right.last;
-        const Curve& other = a.curves[leftward ? i + 1 : i];
-        for (int k = begin; k != end; k += step) {
-            const double at = line.abscissa(k), next = line.abscissa(k + step);
-            if (std::abs(line.ordinate(k) - other.value(at)) > line.tolerance_at(k)) return cut;
-            if (leftward ? x < next : x > next) continue;
-            const int before = leftward ? k - 1 : k;
-            return meeting(before, before + 1, x, k + step * (x - at) / (next - at));
-        }
-        return cut;
-    }
+    Candidate measure(const Line<T>& line, const Curve& f, const Curve& g, const Position& edge) const {
+        const double x = edge.abscissa;
+        const EdgeSide f1 = options_.endpoint ? from_endpoint(line, f, edge.before, x) : at_midpoint(line, f, x);
+        const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_midpoint(line, g, x);
+        double jump = edge.intersects ? 0 : jump_strength(line, f1, f2);
+        double crease = crease_strength(f1, f2);
 
-    Candidate measure(const Line<T>& line, const Curve& f, const Curve& g, const Cut& cut) const {
-        // Both curves at the edge position, or the alternatives: extrapolated from either end point by its own slope.
-        const bool endpoint = parameters_.endpoint;
-        const double xf = endpoint ? line.abscissa(cut.before) : cut.abscissa;
-        const double xg = endpoint ? line.abscissa(cut.after) : cut.abscissa;
-        const double mf = f.slope(xf), mg = g.slope(xg);
-        const double zf = endpoint ? line.ordinate(cut.before) : f.value(xf);
-        const double zg = endpoint ? line.ordinate(cut.after) : g.value(xg);
-        const double yf = zf + (endpoint ? mf * (cut.abscissa - xf) : 0);
-        const double yg = zg + (endpoint ? mg * (cut.abscissa - xg) : 0);
-        const auto tf = line.tangent(xf, zf, mf), tg = line.tangent(xg, zg, mg);
-        const double cross = tf.s * tg.r - tf.r * tg.s, dot = tf.s * tg.s + tf.r * tg.r;
-
-        double jump = cut.meeting ? 0 : std::abs(line.depth(yf) - line.depth(yg));
-        double crease = degrees_of(cross, dot);
-        const double sigma = (line.sigma_at(cut.before) + line.sigma_at(cut.after)) / 2;
-        const double turn_f = line.turn(tf, zf), turn_g = line.turn(tg, zg);
-        const double vf = f.slope_variance(xf), vg = g.slope_variance(xg);
-        double jump_significance = std::abs(yf - yg) / (sigma * std::sqrt(f.value_variance(xf) + g.value_variance(xg)));
-        double crease_significance =
-            crease / (degrees * sigma * std::sqrt(turn_f * turn_f * vf + turn_g * turn_g * vg));
-        const double least = std::min(lone_significance, parameters_.min_significance);
-        if (!std::isfinite(jump) || !(jump_significance >= least)) jump = jump_significance = 0;
-        if (!std::isfinite(crease) || !(crease_significance >= least)) crease = crease_significance = 0;
+        const double sigma = (line.sigma_at(edge.before) + line.sigma_at(edge.after)) / 2;
+        const double difference = std::abs(f1.ordinate - f2.ordinate);
+        double of_jump = difference / jump_deviation(f1, f2, sigma);
+        double of_crease = crease / crease_deviation(f1, f2, sigma);
+        const double least = std::min(lone_significance, options_.min_significance);
+        if (!std::isfinite(jump) || !(of_jump >= least)) jump = of_jump = 0;
+        if (!std::isfinite(crease) || !(of_crease >= least)) crease = of_crease = 0;
 
         Candidate c{};
-        c.x = static_cast<float>(line.path.col + cut.sample * line.path.dcol);
-        c.y = static_cast<float>(line.path.row + cut.sample * line.path.drow);
-        c.shift = static_cast<float>(cut.shift);
         c.jump = static_cast<float>(std::min(jump, static_cast<double>(std::numeric_limits<float>::max())));
         c.crease = static_cast<float>(crease);
-        const double significance = jump > 0 ? std::max(jump_significance, crease_significance) : crease_significance;
+        const double significance = jump > 0 ? std::max(of_jump, of_crease) : of_crease;
         c.significance = std::min(static_cast<float>(significance), endless);
-        // A jump exceeds the error of the approximation, and is significant without its neighbours.
-        const double error = jump_tolerances * std::max(line.tolerance_at(cut.before), line.tolerance_at(cut.after));
-        if (jump > 0 && std::abs(yf - yg) > error && jump_significance > jump_alone)
-            c.kind |= static_cast<std::uint8_t>(jump_bit | (yf > yg ? occluding_bit : occluded_bit));
-        if (crease > 0) c.kind |= cross > 0 ? convex_bit : concave_bit;  // the tangent turns away from the viewer
-        c.direction = static_cast<std::uint8_t>(direction_);
-        c.before = static_cast<std::int32_t>(line.path.pixel(cut.before, cols_));
-        c.after = static_cast<std::int32_t>(line.path.pixel(cut.after, cols_));
-        c.sides[0] = side(line, yf, mf, vf);
-        c.sides[1] = side(line, yg, mg, vg);
-        const double w = line.start + line.step * cut.abscissa;
-        for (int i = 0; i < 2; ++i) c.along[i] = static_cast<float>(line.along[i]);
-        c.place[0] = static_cast<float>(w * line.along[0] - line.across * line.along[1]);
-        c.place[1] = static_cast<float>(w * line.along[1] + line.across * line.along[0]);
+        const double tolerance = std::max(line.tolerance_at(edge.before), line.tolerance_at(edge.after));
+        if (jump > 0 && difference > jump_tolerances * tolerance && of_jump > jump_significance)
+            c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
+        if (crease > 0) c.kind |= is_convex(f1, f2) ? convex_bit : concave_bit;
+        locate(c, line, edge);
+        c.sides[0] = side(line, f1);
+        c.sides[1] = side(line, f2);
         return c;
     }
 
-    static Side side(const Line<T>& line, double value, double slope, double variance) {
-        return {static_cast<float>(value), static_cast<float>(slope * line.per_step),
-                std::min(static_cast<float>(variance * line.per_step * line.per_step), endless)};
+    void locate(Candidate& c, const Line<T>& line, const Position& edge) const {
+        c.x = static_cast<float>(line.path.col + edge.sample * line.path.dcol);
+        c.y = static_cast<float>(line.path.row + edge.sample * line.path.drow);
+        c.shift = static_cast<float>(edge.shift);
+        c.direction = static_cast<std::uint8_t>(direction_);
+        c.before = static_cast<std::int32_t>(line.pixel(edge.before));
+        c.after = static_cast<std::int32_t>(line.pixel(edge.after));
+        const double w = line.start + line.step * edge.abscissa, *d = line.direction;
+        for (int i = 0; i < 2; ++i) c.plane_direction[i] = static_cast<float>(d[i]);
+        c.plane_position[0] = static_cast<float>(w * d[0] - line.offset * d[1]);
+        c.plane_position[1] = static_cast<float>(w * d[1] + line.offset * d[0]);
     }
 
-    int cols_;
-    Parameters parameters_;
+    static Side side(const Line<T>& line, const EdgeSide& f) {
+        return {static_cast<float>(f.ordinate), static_cast<float>(f.slope * line.per_step),
+                std::min(static_cast<float>(f.slope_variance * line.per_step * line.per_step), endless)};
+    }
+
+    const ScanLineOptions& options_;
     LineReader<T> reader_;
     int direction_;
 };
 
-}  // namespace
+// Neighbouring lines of one direction, and the candidates on them.
+struct Part {
+    int direction, first, count;
+    std::vector<Candidate> found;
+};
 
-template <class T>
-std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters) {
-    // Neighbouring lines of one direction. Any thread may take any part: they are many, and what they cost differs.
-    struct Part {
-        int direction, first, count;
-        std::vector<Candidate> found;
-    };
+std::vector<Part> parts_of(int directions, int rows, int cols) {
     std::vector<Part> parts;
-    for (const int direction : {rows_bit, cols_bit, diag45_bit, diag135_bit}) {
-        const int lines = parameters.directions & direction ? line_count(direction, image.rows, image.cols) : 0;
+    for (const int direction : all_directions) {
+        const int lines = directions & direction ? line_count(direction, rows, cols) : 0;
         for (int first = 0; first < lines; first += strip_lines)
             parts.push_back({direction, first, std::min(strip_lines, lines - first), {}});
     }
+    return parts;
+}
+
+}  // namespace
+
+template <class T>
+std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, int threads) {
+    std::vector<Part> parts = parts_of(options.directions, frame.rows, frame.cols);
     constexpr int parts_per_thread = 8;  // for fewer another thread is not worth starting
-    Team team(std::min(parameters.threads, 1 + static_cast<int>(parts.size()) / parts_per_thread));
+    Team team(std::min(threads, 1 + static_cast<int>(parts.size()) / parts_per_thread));
+    // Any thread may take any part: they are many, and what they cost differs.
     std::atomic<std::size_t> taken{0};
     team.run([&](int) {
         Strip<T> strip;
-        Approximator<T> approximator(parameters);
+        Approximator<T> approximator(options);
         std::vector<Candidate> found;
         for (std::size_t i; (i = taken++) < parts.size();) {
             Part& part = parts[i];
-            const LineDetector<T> detector(image, noise, parameters, part.direction);
+            const LineDetector<T> detector(frame, options, part.direction);
             detector.read(part.first, part.count, strip);
             found.clear();
             detector.detect(strip, approximator, found);
@@ -175,12 +140,12 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
     for (Part& part : parts)
         for (Candidate& c : part.found) c.order = order++;
     std::vector<Candidate> candidates(static_cast<std::size_t>(order));
-    Cells cells(image.rows, image.cols);
+    Cells cells(frame.rows, frame.cols);
     for (const Part& part : parts) cells.count(part.found);
     for (const Part& part : parts)
-        cells.place(part.found, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
+        cells.assign(part.found, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
     parts.clear();
-    pool(candidates, image, parameters, team);
+    join_neighbours(candidates, frame, options, team);
     return candidates;
 }
 
@@ -189,25 +154,7 @@ void put_in_order(std::vector<Candidate>& candidates) {
               [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
 }
 
-void combine(const std::vector<Candidate>& candidates, float* jump, float* crease, std::uint8_t* kind,
-             float* significance) {
-    for (const Candidate& c : candidates) {
-        for (const std::int32_t p : {c.before, c.after}) {
-            const bool nearer = ((c.kind & occluding_bit) != 0) == (p == c.before);
-            if (c.kind & jump_bit)
-                kind[p] = static_cast<std::uint8_t>(kind[p] | jump_bit | (nearer ? occluding_bit : occluded_bit));
-            if (c.crease > crease[p] || (c.crease > 0 && c.crease == crease[p] && (c.kind & convex_bit))) {
-                crease[p] = c.crease;
-                const int other = kind[p] & ~(convex_bit | concave_bit);
-                kind[p] = static_cast<std::uint8_t>(other | (c.kind & (convex_bit | concave_bit)));
-            }
-            jump[p] = std::max(jump[p], c.jump);
-            significance[p] = std::max(significance[p], c.significance);
-        }
-    }
-}
-
-template std::vector<Candidate> detect(const RangeImage<float>&, const Noise&, const Parameters&);
-template std::vector<Candidate> detect(const RangeImage<double>&, const Noise&, const Parameters&);
+template std::vector<Candidate> find_candidates(const Frame<float>&, const ScanLineOptions&, int);
+template std::vector<Candidate> find_candidates(const Frame<double>&, const ScanLineOptions&, int);
 
 }  // namespace rangeedge

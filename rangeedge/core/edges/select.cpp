@@ -19,16 +19,14 @@ void long_components(const std::uint8_t* edges, int rows, int cols, int min_leng
     const Components parts(image.data(), rows, cols, 8);
     for (int i = 0; i < parts.count(); ++i) {
         int left = cols, right = -1, top = rows, bottom = -1;
-        const auto row_of = [&](int p) { return p / (cols + 2) - 1; };
         for (const auto [begin, end] : parts.runs(i)) {
-            const int first = begin - (row_of(begin) + 1) * (cols + 2) - 1;
-            left = std::min(left, first), right = std::max(right, first + end - begin - 1);
-            top = std::min(top, row_of(begin)), bottom = std::max(bottom, row_of(begin));
+            left = std::min(left, parts.col_of(begin)), right = std::max(right, parts.col_of(end - 1));
+            top = std::min(top, parts.row_of(begin)), bottom = std::max(bottom, parts.row_of(begin));
         }
         if (std::max(right - left, bottom - top) + 1 < min_length) continue;
         for (const auto [begin, end] : parts.runs(i)) {
-            const int row = row_of(begin), first = begin - (row + 1) * (cols + 2) - 1;
-            std::fill_n(kept + static_cast<std::size_t>(row) * width + first, end - begin, std::uint8_t{1});
+            const auto row = static_cast<std::size_t>(parts.row_of(begin));
+            std::fill_n(kept + row * width + parts.col_of(begin), end - begin, std::uint8_t{1});
         }
     }
 }

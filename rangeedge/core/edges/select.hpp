@@ -1,4 +1,5 @@
-// Which pixels of an edge map stay.
+// Which pixels of an edge map stay: isolated ones are mostly noise. The paper names thresholds on strength and length
+// of edges for that (paper, 6); this is the length, and the longer side of the bounding box stands for it.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>

@@ -1,4 +1,8 @@
 // Connected components of an image, as runs of pixels in rows.
+//
+// One pass over the image finds the runs of equal values and joins each one with those of the row above that touch it,
+// in a forest whose roots are the first runs of components (union and find); a second pass over the runs numbers the
+// components and sorts the runs by them.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
@@ -26,8 +30,8 @@ public:
 
     // `connectivity` is 4 or 8.
     template <class T>
-    Components(const T* image, int rows, int cols, int connectivity = 4) {
-        const int stride = cols + 2, reach = connectivity == 8;
+    Components(const T* image, int rows, int cols, int connectivity = 4) : stride_(cols + 2) {
+        const int stride = stride_, reach = connectivity == 8;
         std::vector<Run> found;
         std::vector<int> parent;  // of runs; roots are first in raster order
         const auto root = [&](std::size_t i) {
@@ -43,11 +47,10 @@ public:
             const std::size_t row_begin = found.size();
             int p = (row + 1) * stride + 1;
             for (const int end = p + cols; (p = find_value(image, p, end)) < end;) {
-                const T value = image[p];
-                const Run run{p, [&] {
-                                  while (image[p] == value) ++p;
-                                  return p;
-                              }()};
+                const int begin = p;
+                const T value = image[begin];
+                while (image[p] == value) ++p;
+                const Run run{begin, p};
                 const std::size_t i = found.size();
                 found.push_back(run);
                 parent.push_back(static_cast<int>(i));
@@ -65,6 +68,9 @@ public:
 
     int count() const { return static_cast<int>(areas_.size()); }
     int area(int i) const { return areas_[static_cast<std::size_t>(i)]; }
+    // Of a pixel, without the margin.
+    int row_of(int pixel) const { return pixel / stride_ - 1; }
+    int col_of(int pixel) const { return pixel % stride_ - 1; }
     // Its runs in raster order.
     Range runs(int i) const {
         const auto k = static_cast<std::size_t>(i);
@@ -103,6 +109,7 @@ private:
         for (std::size_t i = 0; i < found.size(); ++i) runs_[next[static_cast<std::size_t>(parent[i])]++] = found[i];
     }
 
+    int stride_;
     std::vector<Run> runs_;            // by component
     std::vector<std::size_t> starts_;  // of components in runs_
     std::vector<int> areas_;

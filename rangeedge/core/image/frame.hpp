@@ -1,22 +1,28 @@
-// Range images as scan lines read them.
+// A range image as every kernel takes it. Whatever a scanner delivers, its pixels become samples of plane curves, since
+// the pixels of a row, a column or a diagonal lie in a plane with the viewpoint, or with the direction of view: the one
+// condition of the method (paper, 4.1, last paragraph).
+//
+// The ordinate of a pixel grows toward the viewer, as z does in the paper: it is a height where lines of sight are
+// parallel, and the inverse depth where they meet in one point, of which planes are affine functions of the image
+// coordinates. NaN marks a pixel without data.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cmath>
-#include <cstddef>
 #include <cstdint>
+
+#include "image/noise.hpp"
 
 namespace rangeedge {
 
-// How pixels become samples of a plane curve (s, r). The ordinate y grows toward the viewer: inverse depth where
-// `projective`, else height or negative depth. NaN marks an invalid pixel.
 template <class T>
-struct RangeImage {
+struct Frame {
     int rows, cols;
-    const T* ordinate;    // (rows, cols), or null where `points` is given
-    const T* points;      // (rows, cols, 3) in the camera frame, or null
-    bool projective;      // rays from one point; else parallel to `axis`
-    double to_plane[6];   // pixel (u, v, 1) to normalised image coordinates, or to lengths on the grid
-    double axis[3];       // viewing direction of `points`
+    const T* ordinate;   // (rows, cols), or null where `points` is given
+    const T* points;     // (rows, cols, 3) in the camera frame, or null
+    bool projective;     // rays from one point; else parallel to `axis`
+    double to_plane[6];  // pixel (u, v, 1) to normalised image coordinates, or to lengths on the grid
+    double axis[3];      // direction of view in the frame of `points`
+    Noise noise;
 
     bool valid_at(int col, int row) const {
         if (col < 0 || row < 0 || col >= cols || row >= rows) return false;
@@ -24,14 +30,5 @@ struct RangeImage {
         return std::isfinite(ordinate ? ordinate[i] : points[3 * i] + points[3 * i + 1] + points[3 * i + 2]);
     }
 };
-
-// The inverse of depths given as T, in units of 1 / `factor`; NaN where a depth, or its inverse, is not positive and
-// finite, or where `mask` (null: nowhere) is 0.
-template <class T, class Real>
-void invert_depth(const T* depth, std::size_t size, Real factor, const std::uint8_t* mask, Real* inverse);
-
-// Adds `bit` where a pixel is valid and one of its eight neighbours in the image is not.
-template <class T>
-void mark_boundary(const RangeImage<T>& image, std::uint8_t bit, std::uint8_t* kind);
 
 }  // namespace rangeedge

@@ -17,14 +17,14 @@
 namespace rangeedge {
 namespace {
 
-constexpr int lag = 6;                        // samples: noise of neighbours this far apart counts as independent
-constexpr std::ptrdiff_t windows = 1 << 15;   // along rows, and along columns, that the estimate rests on at most
-constexpr std::size_t most_bins = 8;
-constexpr std::size_t bin_size = 50;          // differences that a bin needs
-constexpr double trim = 0.75;                 // share of the differences, the small ones, that the estimate rests on
-constexpr double trimmed_normal = 0.607;      // deviation of a normal variable within its central 75 %
-constexpr double quantised = 0.05;            // share of differences other than zero that tells steps from edges
-constexpr double least_moved = 0.05;          // quantile of these that stands for one step
+constexpr int lag = 6;                       // samples: noise of neighbours this far apart counts as independent
+constexpr std::ptrdiff_t windows = 1 << 15;  // along rows, and along columns, that the estimate rests on at most
+constexpr std::size_t max_bins = 8;
+constexpr std::size_t bin_size = 50;      // differences that a bin needs
+constexpr double trim = 0.75;             // share of the differences, the small ones, that the estimate rests on
+constexpr double trimmed_normal = 0.607;  // deviation of a normal variable within its central 75 %
+constexpr double quantised_share = 0.05;  // share of differences other than zero that tells steps from edges
+constexpr double step_quantile = 0.05;    // quantile of these that stands for one step
 
 // Values by rank, for many ranks: they are put into buckets by size; of a bucket only the ranks asked for are found.
 class Ranked {
@@ -47,6 +47,7 @@ public:
         std::nth_element(place(*(above - 1)), place(rank), place(*above));
         return static_cast<double>(values_[rank]);
     }
+
 private:
     static constexpr std::uint32_t buckets = 1 << 12;
 
@@ -115,8 +116,8 @@ RANGEEDGE_INLINE double squares_below_in(const float* values, std::size_t count,
     float kept[F::count];
     for (std::size_t k = 0; k < count; k += F::count) {
         F v = F::load(values + k);
-        v = from_bits(bits(v) & negative(bits(v) - Ints<bytes>::all(limit)));
-        if (count - k < F::count) v = first_lanes(v, static_cast<int>(count - k));
+        v = from_bits(bits(v) & sign_mask(bits(v) - Ints<bytes>::all(limit)));
+        if (count - k < F::count) v = keep_first(v, static_cast<int>(count - k));
         v.store(kept);
         for (int half = 0; half < F::count; half += D::count) {
             const D d = load_doubles<bytes>(kept + half);
@@ -204,9 +205,9 @@ double trimmed_deviation(const float* differences, std::size_t count) {
     const double sigma = std::sqrt(histogram.squares(kept) / static_cast<double>(kept) / 20) / trimmed_normal;
     // Where values are coarsely quantised most differences are zero and the others multiples of the step; the least of
     // these, unless they are so few that they are edges, bounds the deviation by that of rounding.
-    const double moved = size - static_cast<double>(histogram.zeros());
-    if (moved == 0 || moved < quantised * size) return sigma;
-    const std::size_t least = histogram.zeros() + static_cast<std::size_t>(least_moved * moved);
+    const double others = size - static_cast<double>(histogram.zeros());
+    if (others == 0 || others < quantised_share * size) return sigma;
+    const std::size_t least = histogram.zeros() + static_cast<std::size_t>(step_quantile * others);
     const double rounding = std::sqrt(12.0);
     return histogram.may_exceed(least, sigma * rounding) ? std::max(sigma, histogram.at(least) / rounding) : sigma;
 }
@@ -214,10 +215,10 @@ double trimmed_deviation(const float* differences, std::size_t count) {
 // The differences in bins of as many each, by ordinate, with `padding` more, and the median ordinates of these.
 std::vector<std::vector<float>> binned(const Differences& differences, NoiseStatistics& result) {
     const std::size_t size = differences.count;
-    const std::size_t count = std::max<std::size_t>(1, std::min(most_bins, size / bin_size));
+    const std::size_t count = std::max<std::size_t>(1, std::min(max_bins, size / bin_size));
     Ranked ranked(differences.ordinates.data(), size);
     result.lowest = ranked.at(0), result.highest = ranked.at(size - 1);
-    std::array<float, most_bins> borders;
+    std::array<float, max_bins> borders;
     borders.fill(std::numeric_limits<float>::infinity());
     for (std::size_t i = 1; i < count; ++i) {
         const double at = static_cast<double>(i) / static_cast<double>(count) * static_cast<double>(size - 1);

@@ -1,56 +1,47 @@
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
+// Distance transforms.
+// SPDX-License-Identifier: Apache-2.0
+#include "distance/distance.hpp"
 
 #include <cstdint>
 
-#include "distance/distance.hpp"
+#include "python/arrays.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-
+namespace rangeedge::python {
 namespace {
 
-template <class T>
-using Image = nb::ndarray<T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Labels = OutImage<std::int32_t>;
 
-int rows(const Image<float>& image) { return static_cast<int>(image.shape(0)); }
-int cols(const Image<float>& image) { return static_cast<int>(image.shape(1)); }
-
-void distance_transform(const Image<const std::uint8_t>& edges, const Image<float>& distance,
-                        const Image<std::int32_t>& labels, int threads) {
-    rangeedge::distance_transform(edges.data(), rows(distance), cols(distance), distance.data(), labels.data(),
-                                  threads);
-}
-
-template <class T>
-void salience_multiplicative(const Image<const T>& salience, const Image<float>& distance,
-                             const Image<std::int32_t>& labels, int threads) {
-    rangeedge::salience_multiplicative(salience.data(), rows(distance), cols(distance), distance.data(),
-                                       labels.data(), threads);
-}
-
-template <class T>
-void salience_additive(const Image<const T>& salience, double lambda, const Image<float>& distance,
-                       const Image<std::int32_t>& labels, int threads) {
-    rangeedge::salience_additive(salience.data(), rows(distance), cols(distance), lambda, distance.data(),
-                                 labels.data(), threads);
+void bound_distance_transform(const Image<std::uint8_t>& edges, const OutImage<float>& distance, const Labels& labels,
+                              int threads) {
+    distance_transform(edges.data(), rows(edges), cols(edges), distance.data(), labels.data(), threads);
 }
 
 template <class T>
 void bind_salience(nb::module_& m) {
-    m.def("salience_multiplicative", &salience_multiplicative<T>, "salience"_a.noconvert(), "distance"_a.noconvert(),
-          "labels"_a.noconvert().none(), "threads"_a, nb::call_guard<nb::gil_scoped_release>());
-    m.def("salience_additive", &salience_additive<T>, "salience"_a.noconvert(), "lambda_"_a,
-          "distance"_a.noconvert(), "labels"_a.noconvert().none(), "threads"_a,
-          nb::call_guard<nb::gil_scoped_release>());
+    m.def(
+        "salience_multiplicative",
+        [](const Image<T>& salience, const OutImage<float>& distance, const Labels& labels, int threads) {
+            salience_multiplicative(salience.data(), rows(salience), cols(salience), distance.data(), labels.data(),
+                                    threads);
+        },
+        array("salience"), array("distance"), optional_array("labels"), "threads"_a, Unlocked());
+    m.def(
+        "salience_additive",
+        [](const Image<T>& salience, double lambda, const OutImage<float>& distance, const Labels& labels,
+           int threads) {
+            salience_additive(salience.data(), rows(salience), cols(salience), lambda, distance.data(), labels.data(),
+                              threads);
+        },
+        array("salience"), "lambda_"_a, array("distance"), optional_array("labels"), "threads"_a, Unlocked());
 }
 
 }  // namespace
 
-// Outputs are written in place; labels may be None. Shapes are the caller's to check.
 void bind_distance(nb::module_& m) {
-    m.def("distance_transform", &distance_transform, "edges"_a.noconvert(), "distance"_a.noconvert(),
-          "labels"_a.noconvert().none(), "threads"_a, nb::call_guard<nb::gil_scoped_release>());
+    m.def("distance_transform", &bound_distance_transform, array("edges"), array("distance"), optional_array("labels"),
+          "threads"_a, Unlocked());
     bind_salience<std::uint8_t>(m);
     bind_salience<float>(m);
 }
+
+}  // namespace rangeedge::python

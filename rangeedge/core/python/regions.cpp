@@ -1,74 +1,71 @@
+// Seeds, regions and closed contours.
 // SPDX-License-Identifier: Apache-2.0
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
+#include "regions/regions.hpp"
+
 #include <nanobind/stl/array.h>
 
 #include <array>
 #include <cstdint>
 
+#include "python/frame.hpp"
 #include "regions/closure.hpp"
-#include "regions/regions.hpp"
 #include "regions/seeds.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-
+namespace rangeedge::python {
 namespace {
 
-template <class T>
-using Map = nb::ndarray<T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Optional = Map<const float>;
+// The maps on which surfaces are fitted, of a frame whose geometry and noise they share.
+struct BoundMap {
+    BoundMap(const BoundFrame& bound, Image<float> x, Image<float> y, Image<float> ordinate, double offset,
+             const std::array<double, 6>& to_plane, Image<std::uint8_t> edges)
+        : arrays{x, y, ordinate, bound.map}, edges(edges) {
+        std::visit(
+            [&](const auto& frame) {
+                map = {frame.rows, frame.cols,       x.data(), y.data(),    ordinate.data(),
+                       offset,     frame.projective, to_plane, frame.noise, edges.data()};
+            },
+            bound.frame);
+    }
 
-int extract_seeds(const Map<const float>& distance, const Map<const std::uint8_t>& mask, float min_distance,
-                  float separation, const Map<std::int32_t>& markers) {
-    return rangeedge::extract_seeds(distance.data(), mask.data(), static_cast<int>(distance.shape(0)),
-                                    static_cast<int>(distance.shape(1)), min_distance, separation, markers.data());
+    Image<float> arrays[4];
+    Image<std::uint8_t> edges;
+    RangeMap map;
+};
+
+int bound_extract_seeds(const Image<float>& distance, const Image<std::uint8_t>& mask, float min_distance,
+                        float separation, const OutImage<std::int32_t>& markers) {
+    return extract_seeds(distance.data(), mask.data(), rows(distance), cols(distance), min_distance, separation,
+                         markers.data());
 }
 
-rangeedge::RangeMap range_map(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
-                              bool projective, const std::array<double, 6>& to_plane,
-                              const std::array<double, 3>& noise, const Optional& noise_map,
-                              const Map<const std::uint8_t>& edges) {
-    return {static_cast<int>(ordinate.shape(0)), static_cast<int>(ordinate.shape(1)), x.data(), y.data(),
-            ordinate.data(), offset, projective, to_plane, noise, noise_map.data(), edges.data()};
+int bound_grow_regions(const BoundMap& map, const Image<std::int32_t>& markers, const RegionParameters& options,
+                       const OutImage<std::int32_t>& labels) {
+    return grow_regions(map.map, markers.data(), options, labels.data());
 }
 
-int grow_regions(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset, bool projective,
-                 const std::array<double, 6>& to_plane, const std::array<double, 3>& noise, const Optional& noise_map,
-                 const Map<const std::uint8_t>& edges, const Map<const std::int32_t>& markers,
-                 const rangeedge::RegionParameters& parameters, const Map<std::int32_t>& labels) {
-    const auto map = range_map(x, y, ordinate, offset, projective, to_plane, noise, noise_map, edges);
-    return rangeedge::grow_regions(map, markers.data(), parameters, labels.data());
-}
-
-void verified_regions(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
-                      bool projective, const std::array<double, 6>& to_plane, const std::array<double, 3>& noise,
-                      const Optional& noise_map, const Map<const std::uint8_t>& edges, double correlation,
-                      double tolerance, double share, int dilations, int min_area, const Map<std::int32_t>& regions) {
-    const auto map = range_map(x, y, ordinate, offset, projective, to_plane, noise, noise_map, edges);
-    rangeedge::verified_regions(map, {correlation, tolerance, share, dilations, min_area}, regions.data());
+void bound_verified_regions(const BoundMap& map, const ClosureParameters& options,
+                            const OutImage<std::int32_t>& regions) {
+    verified_regions(map.map, options, regions.data());
 }
 
 }  // namespace
 
-// Outputs are written in place; masks may be None. Shapes are the caller's to check.
 void bind_regions(nb::module_& m) {
-    m.def("extract_seeds", &extract_seeds, "distance"_a.noconvert(), "mask"_a.noconvert().none(), "min_distance"_a,
-          "separation"_a, "markers"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
-    using rangeedge::RegionParameters;
-    nb::class_<RegionParameters>(m, "RegionParameters")
-        .def(
-            "__init__",
-            [](RegionParameters* self, double tolerance, double smooth_angle, int min_area, bool new_seeds) {
-                new (self) RegionParameters{tolerance, smooth_angle, min_area, new_seeds};
-            },
-            nb::kw_only(), "tolerance"_a, "smooth_angle"_a, "min_area"_a, "new_seeds"_a);
-    m.def("grow_regions", &grow_regions, "x"_a.noconvert().none(), "y"_a.noconvert().none(), "ordinate"_a.noconvert(),
-          "offset"_a, "projective"_a, "to_plane"_a, "noise"_a, "noise_map"_a.noconvert().none(),
-          "edges"_a.noconvert().none(), "markers"_a.noconvert(), "parameters"_a, "labels"_a.noconvert(),
-          nb::call_guard<nb::gil_scoped_release>());
-    m.def("verified_regions", &verified_regions, "x"_a.noconvert().none(), "y"_a.noconvert().none(),
-          "ordinate"_a.noconvert(), "offset"_a, "projective"_a, "to_plane"_a, "noise"_a,
-          "noise_map"_a.noconvert().none(), "edges"_a.noconvert().none(), "correlation"_a, "tolerance"_a, "share"_a,
-          "dilations"_a, "min_area"_a, "regions"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
+    nb::class_<BoundMap>(m, "RangeMap", "Maps on which surfaces are fitted: places, ordinates less an offset, edges.")
+        .def(nb::init<const BoundFrame&, Image<float>, Image<float>, Image<float>, double, const std::array<double, 6>&,
+                      Image<std::uint8_t>>(),
+             "frame"_a, optional_array("x"), optional_array("y"), array("ordinate"), "offset"_a, "to_plane"_a,
+             optional_array("edges"));
+    using R = RegionParameters;
+    bind_options(m, "RegionOptions", field("tolerance", &R::tolerance), field("smooth_angle", &R::smooth_angle),
+                 field("min_area", &R::min_area), field("new_seeds", &R::new_seeds));
+    using C = ClosureParameters;
+    bind_options(m, "ClosureOptions", field("correlation", &C::correlation), field("tolerance", &C::tolerance),
+                 field("share", &C::share), field("dilations", &C::dilations), field("min_area", &C::min_area));
+    m.def("extract_seeds", &bound_extract_seeds, array("distance"), optional_array("mask"), "min_distance"_a,
+          "separation"_a, array("markers"), Unlocked());
+    m.def("grow_regions", &bound_grow_regions, "map"_a, array("markers"), "options"_a, array("labels"), Unlocked());
+    m.def("verified_regions", &bound_verified_regions, "map"_a, "options"_a, array("regions"), Unlocked());
 }
+
+}  // namespace rangeedge::python

@@ -33,11 +33,7 @@ SurfaceImage::SurfaceImage(const RangeMap& map, double lateral)
     const double extent = static_cast<double>(high) - static_cast<double>(low) + std::abs(offset_);
     const double least = std::max(resolution * extent, std::numeric_limits<double>::min());
     const auto sigma = [&](int k) {
-        const double ordinate = offset_ + static_cast<double>(map.ordinate[k]);
-        const double z = projective_ ? 1 / ordinate : std::abs(ordinate);
-        const double length = map.noise_map ? static_cast<double>(map.noise_map[k])
-                                            : map.noise[0] + (map.noise[1] + map.noise[2] * z) * z;
-        return std::max(projective_ ? length * ordinate * ordinate : length, least);
+        return std::max(map.noise.sigma(offset_ + static_cast<double>(map.ordinate[k]), k, projective_), least);
     };
     std::vector<double> sigmas;
     for (int k = 0; k < rows_ * cols_; k += sigmas.empty() ? 1 : sample_step - k % sample_step)

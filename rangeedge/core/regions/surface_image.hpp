@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "image/noise.hpp"
 #include "regions/surface.hpp"
 
 namespace rangeedge {
@@ -21,8 +22,7 @@ struct RangeMap {
     double offset;
     bool projective;                  // the ordinate is inverse depth, else height
     std::array<double, 6> to_plane;   // (x, y, 1) to normalised image coordinates, or to lengths
-    std::array<double, 3> noise;      // standard deviation a + b z + c z^2 of a length z
-    const float* noise_map;           // or that of every pixel; null: the former
+    Noise noise;                      // of lengths
     const std::uint8_t* edges;        // non-zero: edge; null: none
 };
 

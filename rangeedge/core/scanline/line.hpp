@@ -1,16 +1,43 @@
-// Scan lines of a range image as plane curves: rows, columns and both diagonals.
+// A scan line, a row, column or diagonal of pixels, as a curve in a plane (paper, 4.1).
+//
+// On a regular grid the plane holds the line and the viewing direction. The curve is y(w): the height y over the place
+// w on the line, both lengths.
+//
+// With a camera the plane holds the line's pixels and the focal point (paper, 4.1, last paragraph). In the image plane
+// z = 1 let d be the direction of the line, n its normal, both of unit length, and `offset` its distance from the
+// origin along n: its pixels lie at w d + offset n. The line of sight of such a pixel has the direction
+//
+//     (w d + offset n, 1) = w (d, 0) + kappa e,   kappa = |(offset n, 1)| = sqrt(1 + offset^2),
+//
+// where e = (offset n, 1) / kappa is a unit vector orthogonal to (d, 0). The two span the plane, and the point of
+// inverse depth q on that line of sight has the coordinates
+//
+//     s = w / q,   r = kappa / q
+//
+// in it, across the view and away from the viewer. The curve is q(w), which we approximate by quadratics instead of
+// the paper's z(x): straight lines of the scene remain straight, the noise of triangulation is even, and w is known of
+// pixels without data.
+//
+// The tangent of a curve y(w) of slope m = dy/dw is, without a positive factor,
+//
+//     (ds/dw, dr/dw) ~ (1, -m)                on the grid, where r = -y,
+//     (ds/dw, dr/dw) ~ (q - w m, -kappa m)    with a camera, by the quotient rule, times q^2.
+//
+// Its angle phi changes with m by |dphi/dm| = |s r' - r s'| / (s^2 + r^2), primes for derivatives of the tangent's
+// coordinates by m, which is 1 / (s^2 + r^2) on the grid and kappa q / (s^2 + r^2) with a camera.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
-#include "edges/candidate.hpp"
-#include "base/simd.hpp"
+#include "image/frame.hpp"
 
 namespace rangeedge {
+
+enum Direction : std::uint8_t { rows_bit = 1, cols_bit = 2, diag45_bit = 4, diag135_bit = 8 };
+constexpr Direction all_directions[] = {rows_bit, cols_bit, diag45_bit, diag135_bit};
 
 // The pixels of one scan line: sample k lies at pixel (col + k dcol, row + k drow).
 struct Path {
@@ -20,57 +47,46 @@ struct Path {
     }
 };
 
-// The lines of one direction (a DIR_* bit), and the i-th of them.
+// The lines of one direction, and the i-th of them.
 int line_count(int direction, int rows, int cols);
 Path line_path(int direction, int i, int rows, int cols);
 
-// Standard deviations of ordinates.
-struct OrdinateNoise {
-    Noise noise;
-    bool projective;
-    double sigma(double ordinate, std::int64_t pixel) const {
-        const double z = std::abs(ordinate);  // a length, or where projective the inverse of one
-        const double length = noise.map ? static_cast<double>(noise.map[pixel]) * (projective ? z * z : 1)
-                              : projective ? (noise.a * z + noise.b) * z + noise.c
-                                           : (noise.c * z + noise.b) * z + noise.a;
-        return std::max(noise.correlation * length, 1e-30);
-    }
+// A vector in the plane of a scan line, along a curve.
+struct Tangent {
+    double s, r;
 };
+inline double cross(const Tangent& a, const Tangent& b) { return a.s * b.r - a.r * b.s; }
+inline double dot(const Tangent& a, const Tangent& b) { return a.s * b.s + a.r * b.r; }
 
-// A scan line in its plane. The abscissa of sample k is x[k] where given, else k; w = start + step * abscissa is its
-// place on the line (a normalised image coordinate where projective, else a length).
+// The abscissa of sample k, in which curves are approximated, is x[k] where given, else k; w = start + step * abscissa.
 template <class T>
 struct Line {
+    const Frame<T>* frame = nullptr;
     Path path{};
-    int cols = 0;
-    const T* y = nullptr;      // `padding` more samples than the path has may be read
+    const T* y = nullptr;      // ordinates; `padding` more samples than the path has may be read
     const T* x = nullptr;      // null where samples are one unit apart
     const T* scale = nullptr;  // inverse tolerances, where they differ
-    bool projective = false;
+    double tolerance = 1;      // of splitting, where they do not
     double start = 0, step = 1, per_step = 1;
-    double kappa = 1;  // in the plane, a point of inverse depth q lies at (w / q, kappa / q)
-    double along[2] = {1, 0}, across = 0;  // the line in the plane of the image: direction, and distance from the origin
-    double tolerance = 1;
-    OrdinateNoise noise{};
+    double direction[2] = {1, 0}, offset = 0;  // d and the distance along n in the plane of the image
+    double kappa = 1;
 
     double abscissa(int k) const { return x ? static_cast<double>(x[k]) : k; }
     double ordinate(int k) const { return static_cast<double>(y[k]); }
-    double depth(double ordinate) const { return projective ? 1 / ordinate : -ordinate; }
-    double sigma_at(int k) const { return noise.sigma(ordinate(k), path.pixel(k, cols)); }
+    double depth(double ordinate) const { return frame->projective ? 1 / ordinate : -ordinate; }
+    std::int64_t pixel(int k) const { return path.pixel(k, frame->cols); }
+    double sigma_at(int k) const { return frame->noise.correlated_sigma(ordinate(k), pixel(k), frame->projective); }
     double tolerance_at(int k) const { return scale ? 1 / static_cast<double>(scale[k]) : tolerance; }
 
-    // The tangent (s, r) of a curve, without its positive factor; r grows away from the viewer.
-    struct Tangent {
-        double s, r;
-    };
+    // Of a curve that has this value and slope, by the abscissa, at an abscissa.
     Tangent tangent(double abscissa, double value, double slope) const {
         const double m = slope * per_step;
-        if (!projective) return {1, -m};
+        if (!frame->projective) return {1, -m};
         return {value - (start + step * abscissa) * m, -kappa * m};
     }
-    // How fast the tangent turns with the slope.
-    double turn(const Tangent& t, double value) const {
-        return (projective ? kappa * value : 1) * per_step / (t.s * t.s + t.r * t.r);
+    // How fast the angle of that tangent changes with the slope.
+    double angle_per_slope(const Tangent& t, double value) const {
+        return (frame->projective ? kappa * value : 1) * per_step / dot(t, t);
     }
 };
 
@@ -82,28 +98,6 @@ template <class T>
 struct Strip {
     std::vector<Line<T>> lines;
     std::vector<T> y, x, scale;
-};
-
-// Reads the lines of one image.
-template <class T>
-class LineReader {
-public:
-    LineReader(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters)
-        : image_(image), noise_{noise, image.projective}, parameters_(parameters) {}
-
-    // The lines first to first + count - 1 of a direction. Read together they share the cache lines of the image.
-    void read(int direction, int first, int count, Strip<T>& strip) const;
-
-private:
-    void place(Line<T>& line) const;
-    void take_rows(Strip<T>& strip) const;
-    void turn_rows(Strip<T>& strip) const;
-    void read_points(Line<T>& line, T* x, T* y) const;
-    void set_tolerance(Line<T>& line, T* scale) const;
-
-    RangeImage<T> image_;
-    OrdinateNoise noise_;
-    Parameters parameters_;
 };
 
 }  // namespace rangeedge

@@ -9,12 +9,12 @@
 namespace rangeedge {
 namespace {
 
-constexpr int exact = 3;  // samples that a quadratic passes through
+constexpr int exact = 3;  // samples through which a quadratic passes
 
 // Negative lanes are not valid: the bits of a NaN, without its sign, exceed those of infinity.
 template <int bytes>
 RANGEEDGE_INLINE Ints<bytes> validity(const float* y) {
-    return Ints<bytes>::all(0x7f800000) - bits(magnitude(Floats<bytes>::load(y)));
+    return Ints<bytes>::all(0x7f800000) - bits(abs(Floats<bytes>::load(y)));
 }
 
 // The first sample that is valid or is not: blocks without one are passed over, then lanes; in these it is sought
@@ -26,13 +26,13 @@ RANGEEDGE_INLINE int find_in(const float* y, int k, int n) {
     for (; k + 4 * I::count <= n; k += 4 * I::count) {
         const I block = join(join(validity<bytes>(y + k), validity<bytes>(y + k + I::count)),
                              join(validity<bytes>(y + k + 2 * I::count), validity<bytes>(y + k + 3 * I::count)));
-        if ((block.joined(join) >= 0) == valid) break;
+        if ((block.reduce(join) >= 0) == valid) break;
     }
     for (; k < n; k += I::count) {
-        const I invalid = negative(validity<bytes>(y + k)), beyond = I::all(n);
+        const I invalid = sign_mask(validity<bytes>(y + k)), beyond = I::all(n);
         const I own = I::from(k), exchanged = (own ^ beyond) & invalid;
         const I at = (valid ? own : beyond) ^ exchanged;
-        const int first = at.joined([](auto a, auto b) RANGEEDGE_ALWAYS { return a < b ? a : b; });
+        const int first = at.reduce([](auto a, auto b) RANGEEDGE_ALWAYS { return a < b ? a : b; });
         if (first < n) return first;
     }
     return n;
@@ -55,7 +55,7 @@ struct ThreePoint {
     T origin, ym, a, b;
 
     ThreePoint(const Samples<T>& line, const Segment& s) {
-        m = s.first + (s.last - s.first) / 2;
+        m = s.midpoint();
         const T left = line.x ? line.x[m] - line.x[s.first] : static_cast<T>(m - s.first);
         const T right = line.x ? line.x[s.last] - line.x[m] : static_cast<T>(s.last - m);
         const T slope_left = (line.y[m] - line.y[s.first]) / left;
@@ -71,23 +71,23 @@ struct ThreePoint {
     }
 };
 
-// Where the largest residual is, if it exceeds the line's eps; else -1.
+// The sample of the largest residual, if that exceeds the line's eps; else -1.
 template <class T>
-int worst_of(const Samples<T>& line, const Segment& s) {
+int worst_sample(const Samples<T>& line, const Segment& s) {
     const ThreePoint<T> curve(line, s);
-    T most = line.eps;
-    int at = -1;
+    T largest = line.eps;
+    int worst = -1;
     for (int k = s.first + 1; k < s.last; ++k) {
         T r = curve.residual(line.x ? line.x[k] : static_cast<T>(k), line.y[k]);
         if (line.scale) r *= line.scale[k];
-        if (r > most) most = r, at = k;
+        if (r > largest) largest = r, worst = k;
     }
-    return at;
+    return worst;
 }
 
 // The same for samples one unit apart, sixteen at a time: each lane keeps its own worst.
 template <int bytes>
-RANGEEDGE_INLINE int worst_in_lanes(const Samples<float>& line, const Segment& s) {
+RANGEEDGE_INLINE int worst_sample_in(const Samples<float>& line, const Segment& s) {
     using F = Floats<bytes>;
     using I = Ints<bytes>;
     const ThreePoint<float> curve(line, s);
@@ -96,9 +96,9 @@ RANGEEDGE_INLINE int worst_in_lanes(const Samples<float>& line, const Segment& s
     I at = I::all(s.last);
     const auto look = [&](int k, int count) RANGEEDGE_ALWAYS {
         const F t = F::from(static_cast<float>(k - curve.m));
-        F r = magnitude(F::load(line.y + k) - (ym + t * (b + a * t)));
+        F r = abs(F::load(line.y + k) - (ym + t * (b + a * t)));
         if (line.scale) r *= F::load(line.scale + k);
-        if (count < F::count) r = first_lanes(r, count);
+        if (count < F::count) r = keep_first(r, count);
         const I index = I::from(k);
         for (int p = 0; p < F::parts; ++p) {
             const auto larger = r.part[p] > worst.part[p];
@@ -109,30 +109,31 @@ RANGEEDGE_INLINE int worst_in_lanes(const Samples<float>& line, const Segment& s
     int k = s.first + 1;
     for (; k + F::count <= s.last; k += F::count) look(k, F::count);
     if (k < s.last) look(k, s.last - k);
-    const float most = worst.joined([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; });
-    if (!(most > line.eps)) return -1;
-    // Across the lanes, without branches: which is the worst cannot be foretold.
-    const F all_most = F::all(most);
+    const float largest = worst.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; });
+    if (!(largest > line.eps)) return -1;
+    // The first of the lanes that have it, without branches: which these are cannot be foretold.
+    const F everywhere = F::all(largest);
     const I beyond = I::all(s.last);
-    for (int p = 0; p < F::parts; ++p) at.part[p] = worst.part[p] == all_most.part[p] ? at.part[p] : beyond.part[p];
-    return at.joined([](auto p, auto q) RANGEEDGE_ALWAYS { return p < q ? p : q; });
+    for (int p = 0; p < F::parts; ++p) at.part[p] = worst.part[p] == everywhere.part[p] ? at.part[p] : beyond.part[p];
+    return at.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p < q ? p : q; });
 }
 
 // Of `count` pending nodes, those to be cut; returns how many. Lines without abscissae.
 template <int bytes>
-RANGEEDGE_INLINE std::size_t find_worst_in(const Samples<float>* lines, const Splitter<float>::Node* nodes,
-                                           const int* pending, std::size_t count, Splitter<float>::Worst* worst) {
-    std::size_t found = 0;
-    for (std::size_t i = 0; i < count; ++i) {
+RANGEEDGE_INLINE std::ptrdiff_t find_worst_of_even_in(const Samples<float>* lines, const Splitter<float>::Node* nodes,
+                                                      const int* pending, std::ptrdiff_t count,
+                                                      Splitter<float>::Worst* worst) {
+    std::ptrdiff_t found = 0;
+    for (std::ptrdiff_t i = 0; i < count; ++i) {
         const Splitter<float>::Node& node = nodes[pending[i]];
-        const int at = worst_in_lanes<bytes>(lines[node.line], node.segment);
-        if (at >= 0) worst[found++] = {pending[i], at};
+        const int sample = worst_sample_in<bytes>(lines[node.line], node.segment);
+        if (sample >= 0) worst[found++] = {pending[i], sample};
     }
     return found;
 }
-RANGEEDGE_VERSIONS(std::size_t, find_worst,
+RANGEEDGE_VERSIONS(std::ptrdiff_t, find_worst_of_even,
                    (const Samples<float>* lines, const Splitter<float>::Node* nodes, const int* pending,
-                    std::size_t count, Splitter<float>::Worst* worst),
+                    std::ptrdiff_t count, Splitter<float>::Worst* worst),
                    (lines, nodes, pending, count, worst))
 
 }  // namespace
@@ -162,19 +163,19 @@ void Splitter<T>::add(const Samples<T>& line) {
 }
 
 template <class T>
-void Splitter<T>::find_worst_of_pending() {
+void Splitter<T>::find_worst() {
     worst_.resize(pending_.size());
     if constexpr (std::is_same_v<T, float>) {
-        if (!lines_.front().x) {
-            worst_.resize(find_worst(lines_.data(), nodes_.data(), pending_.data(), pending_.size(), worst_.data()));
+        if (!lines_[0].x) {
+            worst_.resize(
+                find_worst_of_even(lines_.data(), nodes_.data(), pending_.data(), pending_.size(), worst_.data()));
             return;
         }
     }
-    std::size_t found = 0;
-    for (const int i : pending_) {
-        const Node& node = nodes_[static_cast<std::size_t>(i)];
-        const int at = worst_of(lines_[static_cast<std::size_t>(node.line)], node.segment);
-        if (at >= 0) worst_[found++] = {i, at};
+    std::ptrdiff_t found = 0;
+    for (const int node : pending_) {
+        const int sample = worst_sample(lines_[nodes_[node].line], nodes_[node].segment);
+        if (sample >= 0) worst_[found++] = {node, sample};
     }
     worst_.resize(found);
 }
@@ -182,23 +183,24 @@ void Splitter<T>::find_worst_of_pending() {
 template <class T>
 void Splitter<T>::split() {
     for (; !pending_.empty(); pending_.swap(following_)) {
-        find_worst_of_pending();
-        std::size_t count = nodes_.size(), follow = 0;
-        nodes_.resize(count + worst_.size());
+        find_worst();
+        int right = static_cast<int>(nodes_.size());  // the part on the right is a new node
+        std::ptrdiff_t follow = 0;
+        nodes_.resize(right + worst_.size());
         following_.resize(2 * worst_.size());
         for (const Worst& worst : worst_) {
-            Node& node = nodes_[static_cast<std::size_t>(worst.node)];
-            const T* y = lines_[static_cast<std::size_t>(node.line)].y + worst.at;
-            // The cut falls between two samples; the extreme one joins the neighbour it is closer to.
+            Node& node = nodes_[worst.node];
+            const T* y = lines_[node.line].y + worst.sample;
             const bool joins_left = std::abs(y[0] - y[-1]) <= std::abs(y[1] - y[0]);
-            const int cut = joins_left ? worst.at : worst.at - 1, right = static_cast<int>(count);
-            nodes_[count++] = {{cut + 1, node.segment.last}, node.line, node.next};
+            const int cut = joins_left ? worst.sample : worst.sample - 1;
+            nodes_[right] = {{cut + 1, node.segment.last}, node.line, node.next};
+            // Parts that a quadratic may not pass through follow; written first and counted then, without branches.
             following_[follow] = worst.node;
-            follow += static_cast<std::size_t>(cut - node.segment.first >= exact);
+            follow += cut - node.segment.first >= exact;
             following_[follow] = right;
-            follow += static_cast<std::size_t>(node.segment.last - cut > exact);
+            follow += node.segment.last - cut > exact;
             node.segment.last = cut;
-            node.next = right;
+            node.next = right++;
         }
         following_.resize(follow);
     }

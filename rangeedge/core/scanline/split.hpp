@@ -1,15 +1,20 @@
-// Scan line approximation (paper, section 4.1): one scan line, a curve in a plane, is split into segments.
+// Splitting of scan lines into segments (paper, 4.1 and Fig. 3), after Duda and Hart.
+//
+// The quadratic f(x) = a x^2 + b x + c through both end points and the midpoint of a run approximates it. Where the
+// largest residual |y - f(x)| exceeds epsilon the run is cut there, and both parts are treated the same way.
+//
+// The paper leaves open to which part the sample of the largest residual belongs. Here a cut falls between two samples:
+// this one goes with the neighbour whose value is closer, since on a jump one of the two lies on the other surface. A
+// line is also cut where samples have no data. Instead of by recursion the segments of one generation, of all lines of
+// a strip, are split in turn, so that a processor works on several at a time; the result is the same.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <vector>
+#include <cstddef>
+
+#include "base/array.hpp"
+#include "scanline/segment.hpp"
 
 namespace rangeedge {
-
-// A curve segment: its first and last sample.
-struct Segment {
-    int first, last;
-    int size() const { return last - first + 1; }
-};
 
 // The first sample at or after k, and before n, that is valid or is not; else n. NaN marks a sample without data.
 // `padding` samples beyond n may be read.
@@ -49,9 +54,7 @@ struct Samples {
     T eps;
 };
 
-// Splits runs of valid samples into segments whose residuals against the quadratic through both end points and the
-// midpoint stay within `eps`. Lines are split together, all segments of one generation in turn, so that a processor
-// works on several at a time. What it needs is reused.
+// Splits strip after strip of lines; what it needs for that is reused.
 template <class T>
 class Splitter {
 public:
@@ -61,9 +64,8 @@ public:
 
     // Calls visit(segment) in order for those of the i-th line that was added.
     template <class Visit>
-    void for_each_segment(std::size_t i, Visit&& visit) const {
-        for (int k = heads_[i]; k >= 0; k = nodes_[static_cast<std::size_t>(k)].next)
-            visit(nodes_[static_cast<std::size_t>(k)].segment);
+    void for_each_segment(std::ptrdiff_t i, Visit&& visit) const {
+        for (int k = heads_[i]; k >= 0; k = nodes_[k].next) visit(nodes_[k].segment);
     }
 
     // A segment, its line, and the next segment there or -1.
@@ -71,19 +73,19 @@ public:
         Segment segment;
         int line, next;
     };
-    // A node to be cut, and where its residual is largest: the first of equals.
+    // A node to be cut, and the sample of its largest residual, the first of equals.
     struct Worst {
-        int node, at;
+        int node, sample;
     };
 
 private:
-    void find_worst_of_pending();
+    void find_worst();
 
-    std::vector<Samples<T>> lines_;
-    std::vector<Node> nodes_;
-    std::vector<int> heads_;                // the first node of each line
-    std::vector<int> pending_, following_;  // nodes of this generation, and of the next one
-    std::vector<Worst> worst_;              // of those pending that are to be cut
+    Array<Samples<T>> lines_;
+    Array<Node> nodes_;
+    Array<int> heads_;                // the first node of each line
+    Array<int> pending_, following_;  // nodes of this generation, and of the next one
+    Array<Worst> worst_;              // of those pending that are to be cut
 };
 
 }  // namespace rangeedge

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "image/frame.hpp"
+#include "image/pixels.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <type_traits>
 #include <vector>
@@ -13,11 +14,11 @@ namespace {
 
 template <class T, class Real>
 RANGEEDGE_INLINE void invert_all(const T* depth, std::size_t size, Real factor, Real* inverse) {
-    constexpr Real most = std::numeric_limits<Real>::max(), nan = std::numeric_limits<Real>::quiet_NaN();
+    constexpr Real largest = std::numeric_limits<Real>::max(), nan = std::numeric_limits<Real>::quiet_NaN();
     for (std::size_t i = 0; i < size; ++i) {
         const Real length = std::is_integral_v<T> ? static_cast<Real>(depth[i]) / factor : static_cast<Real>(depth[i]);
         const Real q = 1 / length;
-        inverse[i] = ((q > 0) & (q <= most)) ? q : nan;
+        inverse[i] = ((q > 0) & (q <= largest)) ? q : nan;
     }
 }
 
@@ -63,24 +64,24 @@ void invert_depth(const T* depth, std::size_t size, Real factor, const std::uint
 }
 
 template <class T>
-void mark_boundary(const RangeImage<T>& image, std::uint8_t bit, std::uint8_t* kind) {
-    // Of the last row read and the two before it, with a column on either side that is valid, as all is beyond the
-    // image.
-    const int cols = image.cols;
+void mark_boundary(const Frame<T>& frame, std::uint8_t bit, std::uint8_t* kind) {
+    // Of every pixel in three rows, the last one read and the two before it: whether it is invalid, and whether it or
+    // one beside it in its row is. A column on either side stands for what lies beyond the image and counts as valid.
+    const int cols = frame.cols;
     const auto width = static_cast<std::size_t>(cols) + 2;
     std::vector<std::uint8_t> invalid(3 * width, 0), wide(3 * width, 0);
     const auto row_of = [&](std::vector<std::uint8_t>& flags, int row) {
         return flags.data() + static_cast<std::size_t>((row + 3) % 3) * width + 1;
     };
-    for (int row = 0; row <= image.rows; ++row) {
+    for (int row = 0; row <= frame.rows; ++row) {
         std::uint8_t *flags = row_of(invalid, row), *wider = row_of(wide, row);
         const std::int64_t first = static_cast<std::int64_t>(row) * cols;
-        if (row == image.rows)
+        if (row == frame.rows)
             std::fill_n(flags, cols, std::uint8_t{0});
-        else if (image.ordinate)
-            flag_invalid(image.ordinate + first, cols, flags);
+        else if (frame.ordinate)
+            flag_invalid(frame.ordinate + first, cols, flags);
         else
-            for (int col = 0; col < cols; ++col) flags[col] = !image.valid_at(col, row);
+            for (int col = 0; col < cols; ++col) flags[col] = !frame.valid_at(col, row);
         widen(flags, cols, wider);
         if (row > 0)
             add_bits(row_of(wide, row - 2), row_of(wide, row - 1), wider, row_of(invalid, row - 1), cols, bit,
@@ -91,7 +92,7 @@ void mark_boundary(const RangeImage<T>& image, std::uint8_t bit, std::uint8_t* k
 template void invert_depth(const float*, std::size_t, float, const std::uint8_t*, float*);
 template void invert_depth(const double*, std::size_t, double, const std::uint8_t*, double*);
 template void invert_depth(const std::uint16_t*, std::size_t, float, const std::uint8_t*, float*);
-template void mark_boundary(const RangeImage<float>&, std::uint8_t, std::uint8_t*);
-template void mark_boundary(const RangeImage<double>&, std::uint8_t, std::uint8_t*);
+template void mark_boundary(const Frame<float>&, std::uint8_t, std::uint8_t*);
+template void mark_boundary(const Frame<double>&, std::uint8_t, std::uint8_t*);
 
 }  // namespace rangeedge
