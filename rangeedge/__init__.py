@@ -29,6 +29,7 @@ from .constants import (
     SALIENCE_MULTIPLICATIVE,
     THIN_ITERATIVE,
     THIN_LEE,
+    THIN_MEDIAL,
     THIN_SKELETON,
 )
 from .detector import ScanLineDetector, createScanLineDetector, detectEdges, detectEdgesWithStrength
@@ -114,6 +115,7 @@ __all__ = [  # noqa: RUF022
     "THIN_SKELETON",
     "THIN_LEE",
     "THIN_ITERATIVE",
+    "THIN_MEDIAL",
     "SALIENCE_MULTIPLICATIVE",
     "SALIENCE_ADDITIVE",
 ]

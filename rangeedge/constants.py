@@ -28,9 +28,10 @@ EDGE_OCCLUDED = 16  # farther side of a jump
 EDGE_BOUNDARY = 32  # valid pixel beside an invalid one
 
 # How an edge map is thinned.
-THIN_SKELETON = 0  # medial skeleton (Zhang and Suen)
+THIN_SKELETON = 0  # skeleton after Zhang and Suen
 THIN_LEE = 1  # skeleton after Lee, Kashyap and Chu
 THIN_ITERATIVE = 2  # thinning after Guo and Hall
+THIN_MEDIAL = 3  # along the middle of every band
 
 # How salience weighs a distance.
 SALIENCE_MULTIPLICATIVE = 0  # min |p - q| / s(q)

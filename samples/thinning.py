@@ -1,4 +1,4 @@
-"""Edge maps one pixel wide, by the three methods of rangeedge.thinEdges.
+"""Edge maps one pixel wide, by every method of rangeedge.thinEdges.
 
 python samples/thinning.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
 """
@@ -10,6 +10,7 @@ from common import load, parser, sheet, write
 import rangeedge
 
 METHODS = {
+    "THIN_MEDIAL": rangeedge.THIN_MEDIAL,
     "THIN_SKELETON": rangeedge.THIN_SKELETON,
     "THIN_LEE": rangeedge.THIN_LEE,
     "THIN_ITERATIVE": rangeedge.THIN_ITERATIVE,

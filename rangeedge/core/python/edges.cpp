@@ -4,6 +4,7 @@
 #include "edges/combine.hpp"
 #include "edges/detect.hpp"
 #include "edges/select.hpp"
+#include "edges/thin.hpp"
 #include "image/pixels.hpp"
 #include "python/frame.hpp"
 #include "scanline/split.hpp"
@@ -92,6 +93,11 @@ void keep_long_components(const Image<std::uint8_t>& edges, int min_length, cons
     long_components(edges.data(), rows(edges), cols(edges), min_length, kept.data());
 }
 
+void thin_to_lines(const Image<std::uint8_t>& edges, const Image<std::uint8_t>& preferred, int spur_length,
+                   const OutImage<std::uint8_t>& thin) {
+    thin_lines(edges.data(), preferred.data(), rows(edges), cols(edges), spur_length, thin.data());
+}
+
 }  // namespace
 
 void bind_edges(nb::module_& m) {
@@ -109,6 +115,8 @@ void bind_edges(nb::module_& m) {
     m.def("edge_strength_and_candidates", &edge_strength_and_candidates, "frame"_a, "options"_a, "threads"_a,
           array("jump"), array("crease"), array("kind"), array("significance"));
     m.def("long_components", &keep_long_components, array("edges"), "min_length"_a, array("kept"), Unlocked());
+    m.def("thin_lines", &thin_to_lines, array("edges"), optional_array("preferred"), "spur_length"_a, array("thin"),
+          Unlocked());
 }
 
 }  // namespace rangeedge::python
