@@ -64,6 +64,10 @@ class ScanLineParams:
         How far, in pixels, the adapted edge position may lie from the cut (P§4.2, Fig. 5); 0 keeps the cut.
     maxGap : int
         Widest gap of invalid pixels on a scan line whose two sides are compared: occlusion shadows.
+    maxSmear : int
+        Most pixels of a scan line over which a step may be smeared, as interpolation and the footprint of a pixel do,
+        to be one jump between the surfaces on either side. More than two are a surface of their own unless it is
+        almost parallel to the viewing direction. 0 takes every pixel for a surface.
     mergeSignificance : float
         Cuts are taken back where that raises the sum of squared residuals by less than its square, in variances of the
         noise; a segment across an edge, or its rounding, is given to the surfaces beside it likewise. 0 keeps all.
@@ -96,6 +100,7 @@ class ScanLineParams:
     crease: int = CREASE_NORMAL
     maxShift: float = 4.0
     maxGap: int = 8
+    maxSmear: int = 5
     mergeSignificance: float = 5.0
     minSignificance: float = 12.0
 
@@ -114,6 +119,7 @@ class ScanLineParams:
         for name in ("maxShift", "mergeSignificance", "minSignificance"):
             number(func, name, getattr(self, name), 0)
         integer(func, "maxGap", self.maxGap, 0)
+        integer(func, "maxSmear", self.maxSmear, 0)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, ScanLineParams):
@@ -125,7 +131,7 @@ class ScanLineParams:
     @classmethod
     def paper(cls, **options: Any) -> ScanLineParams:
         """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept."""
-        basic = {"fit": FIT_INTERP, "crease": CREASE_MAX, "maxShift": 0.0, "maxGap": 0}
+        basic = {"fit": FIT_INTERP, "crease": CREASE_MAX, "maxShift": 0.0, "maxGap": 0, "maxSmear": 0}
         return cls(**{**basic, "mergeSignificance": 0.0, "minSignificance": 0.0, **options})
 
 
@@ -388,6 +394,8 @@ def _kernel_parameters(params: ScanLineParams, frame: RangeFrame) -> _core.Param
         normals=params.crease == CREASE_NORMAL,
         max_shift=params.maxShift,
         max_gap=params.maxGap,
+        max_smear=params.maxSmear,
+        spaced=params.K is not None or params.pixelSize is not None or frame.samples.ndim == 3,
         merge_significance=params.mergeSignificance,
         min_significance=params.minSignificance,
         threads=frame.threads,

@@ -40,6 +40,8 @@ JUMP_TOLERANCES, JUMP_ALONE = 2.0, 12.0
 REACH, CAPPED, LONE_SHARE = 4.0, 8.0, 1 / 3  # pixels; standard deviations
 LEAST_SLOPE = 0.3
 LEAST_SPREAD, LEAST_DIRECTIONS = 0.05, (0.02, 1e-9)
+ALWAYS_SMEARED, VEIL = 2, 20.0  # samples; degrees
+OVERSHOOT, OWN_SHARE, LEAST_RAMP = 0.1, 0.15, 0.5  # of a smeared step
 SMALLEST = 1e-30
 
 TIE = 1e-5  # relative: closer comparisons count as decided by rounding
@@ -184,6 +186,22 @@ class Line:
     scale: np.ndarray | None  # inverse tolerances, where they differ
     place: Any = None  # abscissa to the position (X, Y) in the plane of the image
 
+    def height(self, y):
+        """The depth of an ordinate, or a height."""
+        with np.errstate(divide="ignore"):
+            return np.float64(1) / y if self.projective else y
+
+    def grazing_angle(self, i, k):
+        """Between the straight line from sample i to sample k and the viewing ray to its middle, in degrees."""
+        points = []
+        for j in (i, k):
+            (X, Y), _ = self.place(float(self.x[j]))
+            y = float(self.y[j])
+            points.append(np.array([X, Y, 1]) / y if self.projective else np.array([X, Y, -y]))
+        way = points[1] - points[0]
+        ray = points[0] + points[1] if self.projective else np.array([0, 0, 1.0])
+        return math.degrees(math.atan2(float(np.linalg.norm(np.cross(way, ray))), abs(float(way @ ray))))
+
     def tangent(self, x, value, slope):
         """Derivative by the abscissa of a curve in space, the ray to its point, and how the ray moves."""
         (X, Y), (dX, dY) = self.place(x)
@@ -245,7 +263,7 @@ class Image:
 
     data: np.ndarray
     K: np.ndarray | None = None
-    spacing: tuple[float, float] = (1.0, 1.0)
+    spacing: tuple[float, float] | None = None
     projective: bool = False
     height: bool = False
     noise: NoiseModel = field(default_factory=lambda: NoiseModel(a=1.0))
@@ -258,6 +276,11 @@ class Image:
     def has_data(self, u, v):
         rows, cols = self.shape
         return 0 <= u < cols and 0 <= v < rows and bool(np.isfinite(self.data[v, u]).all())
+
+    @property
+    def spaced(self):
+        """Whether the spacing of pixels is known as a length."""
+        return self.K is not None or self.spacing is not None or self.data.ndim == 3
 
     @property
     def z_sign(self):
@@ -298,7 +321,7 @@ class Image:
         values = self.data[v, u]
         y = 1 / values if self.projective else values if self.height else -values
         x = np.arange(len(pixels)).astype(values.dtype)
-        to_plane = np.diag([*self.spacing, 1.0]) if self.K is None else np.linalg.inv(self.K)
+        to_plane = np.diag([*(self.spacing or (1.0, 1.0)), 1.0]) if self.K is None else np.linalg.inv(self.K)
         start = to_plane @ [*pixels[0], 1.0]
         dx, dy = STEPS[self._direction(pixels)]
         step = to_plane @ [dx, dy, 0.0]
@@ -376,13 +399,53 @@ class Detector:
                 s.curve = self._fit(line, s)
             for refinement in REFINEMENTS if self.p.mergeSignificance > 0 else ():
                 segments = getattr(self, "_" + refinement)(line, segments)
-        found = []
-        for left, right in pairwise(segments):
-            if right.first - left.last - 1 <= self.p.maxGap:
-                candidate = self._measured(line, left, right, *self._position(line, left, right))
-                if candidate.jump > 0 or candidate.crease > 0:
-                    found.append(candidate)
+        found, i = [], 0
+        while i + 1 < len(segments):
+            candidate, i = self._smeared_step(line, segments, i) or (self._at_cut(line, *segments[i : i + 2]), i + 1)
+            if candidate and (candidate.jump > 0 or candidate.crease > 0):
+                found.append(candidate)
         return found
+
+    def _at_cut(self, line, left, right):
+        gap = right.first - left.last - 1
+        if gap > self.p.maxGap or (gap and min(left.size, right.size) == 1):
+            return None
+        return self._measured(line, left, right, *self._position(line, left, right))
+
+    def _smeared_step(self, line, segments, i):
+        """The jump over the short segments after the i-th one, and the number of the long one after them; or None."""
+        long = [j for j in range(i, len(segments)) if segments[j].size > self.p.maxSmear][:2]
+        if len(long) < 2 or long[0] != i or long[1] == i + 1:
+            return None
+        left, short, right = segments[i], segments[i + 1 : long[1]], segments[long[1]]
+        samples = [k for s in short for k in range(s.first, s.last + 1)]
+        gaps = [b.first - a.last - 1 for a, b in pairwise(segments[i : long[1] + 1])]
+        if len(samples) > self.p.maxSmear or max(gaps) > self.p.maxGap:
+            return None
+        x = _doubles(line.x, samples)
+        before, after = ([s.curve.value(t) for t in x] for s in (left, right))
+        if line.projective and min(before + after) <= 0:
+            return None
+        steps = np.subtract(after, before)
+        if not (np.all(steps > 0) or np.all(steps < 0)):
+            return None
+        here, before, after = (line.height(np.array(y)) for y in (_doubles(line.y, samples), before, after))
+        share = (here - before) / (after - before)
+        slack = np.maximum(OVERSHOOT, line.tolerance[samples] / abs(steps))
+        n = len(samples)
+        if np.any(share < -slack) or np.any(share > 1 + slack):
+            return None
+        if share[-1] - share[0] < LEAST_RAMP * (n - 1) / (n + 1):
+            return None
+        rising = [k for k, p in zip(samples, share, strict=True) if p > OWN_SHARE]
+        falling = [k for k, p in zip(samples, share, strict=True) if p < 1 - OWN_SHARE]
+        a = max([left.last] + [k for k in samples if not rising or k < rising[0]])
+        b = min([right.first] + [k for k in samples if not falling or k > falling[-1]])
+        if self.image.spaced and b - a - 1 > ALWAYS_SMEARED and line.grazing_angle(a, b) > VEIL:
+            return None
+        middle = (float(line.x[a]) + float(line.x[b])) / 2
+        candidate = self._measured(line, left, right, a, b, middle, (a + b) / 2, False)
+        return (candidate, long[1]) if candidate.kind & EDGE_JUMP else None
 
     def _fit(self, line, s):
         k = np.arange(s.first, s.last + 1)
@@ -475,8 +538,13 @@ class Detector:
             xf = xg = x
             yf, yg = zf, zg = left.curve.value(x), right.curve.value(x)
             mf, mg = left.curve.slope(x), right.curve.slope(x)
-        height = (lambda y: 1 / y) if line.projective else (lambda y: y)
+        height = line.height
         jump = 0.0 if meets else abs(height(yf) - height(yg))
+        ends = float(line.x[before]), float(line.x[after])
+        ahead = min((ends[1] - ends[0]) / (after - before), (ends[1] - ends[0]) / 2)
+        inside = height(left.curve.value(ends[0] - ahead)), height(right.curve.value(ends[1] + ahead))
+        ends = height(left.curve.value(ends[0])), height(right.curve.value(ends[1]))
+        jump = min(jump, abs(ends[0] - ends[1]) + abs(ends[0] - inside[0]) + abs(ends[1] - inside[1]))
         bend = line.crease(xf, (zf, mf), xg, (zg, mg))
         sigma = (line.sigma[before] + line.sigma[after]) / 2
         jump_deviation = sigma * math.sqrt(left.curve.value_variance(xf) + right.curve.value_variance(xg))
@@ -493,6 +561,7 @@ class Detector:
         error = JUMP_TOLERANCES * max(line.tolerance[before], line.tolerance[after])
         if jump > 0 and abs(yf - yg) > error and jump_significance > JUMP_ALONE:
             kind |= EDGE_JUMP | (EDGE_OCCLUDING if yf > yg else EDGE_OCCLUDED)
+            crease = 0.0
         if crease > 0:
             kind |= EDGE_CONVEX if bend > 0 else EDGE_CONCAVE
         (u, v), (dx, dy) = line.pixels[0], STEPS[line.direction]
@@ -651,17 +720,26 @@ def edge_strength(image, candidates):
     rows, cols = image.shape
     jump, crease, significance = (np.zeros((rows, cols)) for _ in range(3))
     kind = np.zeros((rows, cols), np.uint8)
+    at_pixels = {}
     for c in candidates:
         for (u, v), occluding in zip(c.pixels, (EDGE_OCCLUDING, EDGE_OCCLUDED), strict=True):
-            if c.kind & EDGE_JUMP:
-                kind[v, u] |= EDGE_JUMP | (EDGE_OCCLUDING if c.kind & occluding else EDGE_OCCLUDED)
-            angle, largest = np.float32(c.crease), np.float32(crease[v, u])
-            if angle > largest or (angle == largest and c.kind & EDGE_CONVEX):
-                crease[v, u] = c.crease
-                kind[v, u] &= ~np.uint8(EDGE_CONVEX | EDGE_CONCAVE)
-                kind[v, u] |= c.kind & (EDGE_CONVEX | EDGE_CONCAVE)
-            jump[v, u] = max(jump[v, u], c.jump)
-            significance[v, u] = max(significance[v, u], c.significance)
+            at_pixels.setdefault((v, u), []).append((c, EDGE_OCCLUDING if c.kind & occluding else EDGE_OCCLUDED))
+    for p, there in at_pixels.items():
+        jump[p] = max(c.jump for c, _ in there)
+        jumps = [(c, side) for c, side in there if c.kind & EDGE_JUMP]
+        sure = max((c.significance for c, _ in jumps), default=0.0)
+        if not any(c.crease > 0 and c.significance > sure for c, _ in there):
+            for _, side in jumps:
+                kind[p] |= EDGE_JUMP | side
+        if kind[p] & EDGE_JUMP:
+            significance[p] = sure
+            continue
+        significance[p] = max(c.significance for c, _ in there)
+        creases = [(np.float32(c.crease), c.kind & EDGE_CONVEX, c) for c, _ in there if c.crease > 0]
+        if creases:
+            largest = max(creases, key=lambda found: found[:2])[2]
+            crease[p] = largest.crease
+            kind[p] |= largest.kind & (EDGE_CONVEX | EDGE_CONCAVE)
     kind[beside_invalid(image)] |= EDGE_BOUNDARY
     return jump, crease, kind, significance
 

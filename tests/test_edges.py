@@ -111,7 +111,7 @@ NOISE = [
     NoiseModel(0.001, 0.0004, 0.0003),
     NoiseModel(b=0.002),
 ]
-SMALL, LARGE = [(1, 1), (1, 17), (13, 1), (2, 9), (3, 3)], (12, 15)
+SMALL, LARGE = [(1, 1), (1, 17), (13, 1), (2, 9), (3, 3)], (14, 23)
 
 
 @pytest.mark.parametrize("setting", range(len(SETTINGS)))

@@ -10,6 +10,7 @@
 #include "line.hpp"
 #include "neighbours.hpp"
 #include "parallel.hpp"
+#include "smear.hpp"
 
 namespace rangeedge {
 namespace {
@@ -41,12 +42,34 @@ public:
 
 private:
     void detect(const Line<T>& line, const Approximation& a, std::vector<Candidate>& candidates) const {
-        for (std::size_t i = 0; i + 1 < a.count; ++i) {
-            if (a.segments[i + 1].first - a.segments[i].last - 1 > parameters_.max_gap) continue;
-            const Cut cut = adapted_position(line, a, i);                                    // P 4.2, Fig. 5
-            const Candidate candidate = measure(line, a.curves[i], a.curves[i + 1], cut);    // P 4.2, Fig. 4
+        for (std::size_t i = 0; i + 1 < a.count;) {
+            Candidate candidate{};
+            std::size_t next = smeared_step(line, a, i, candidate);
+            if (next == i) candidate = step_or_crease(line, a, i), next = i + 1;
             if (candidate.jump > 0 || candidate.crease > 0) candidates.push_back(candidate);
+            i = next;
         }
+    }
+
+    Candidate step_or_crease(const Line<T>& line, const Approximation& a, std::size_t i) const {
+        const Segment &left = a.segments[i], &right = a.segments[i + 1];
+        const int gap = right.first - left.last - 1;
+        if (gap > parameters_.max_gap) return {};
+        // A single sample tells nothing of what is beyond the gap beside it.
+        if (gap > 0 && std::min(left.size(), right.size()) < 2) return {};
+        const Cut cut = adapted_position(line, a, i);              // P 4.2, Fig. 5
+        return measure(line, a.curves[i], a.curves[i + 1], cut);   // P 4.2, Fig. 4
+    }
+
+    // The one jump of a step that is smeared over a few samples after segment i. Returns the segment on its other side,
+    // or i where there is none.
+    std::size_t smeared_step(const Line<T>& line, const Approximation& a, std::size_t i, Candidate& candidate) const {
+        const Smear smear = smear_after(line, a, i, parameters_);
+        if (smear.next == i) return i;
+        const double xa = line.abscissa(smear.before), xb = line.abscissa(smear.after);
+        const Cut cut{smear.before, smear.after, (xa + xb) / 2, (smear.before + smear.after) / 2.0, 0, false};
+        candidate = measure(line, a.curves[i], a.curves[smear.next], cut);
+        return candidate.kind & jump_bit ? smear.next : i;
     }
 
     // The intersection of the two curves nearest the cut becomes the edge position if it is within reach and the
@@ -92,7 +115,7 @@ private:
         const auto tf = line.tangent(xf, zf, mf), tg = line.tangent(xg, zg, mg);
         const double cross = tf.s * tg.r - tf.r * tg.s, dot = tf.s * tg.s + tf.r * tg.r;
 
-        double jump = cut.meeting ? 0 : std::abs(line.depth(yf) - line.depth(yg));
+        double jump = cut.meeting ? 0 : std::min(std::abs(line.depth(yf) - line.depth(yg)), largest_jump(line, f, g, cut));
         double crease = degrees_of(cross, dot);
         const double sigma = (line.sigma_at(cut.before) + line.sigma_at(cut.after)) / 2;
         const double turn_f = line.turn(tf, zf), turn_g = line.turn(tg, zg);
@@ -104,6 +127,12 @@ private:
         if (!std::isfinite(jump) || !(jump_significance >= least)) jump = jump_significance = 0;
         if (!std::isfinite(crease) || !(crease_significance >= least)) crease = crease_significance = 0;
 
+        // A jump exceeds the error of the approximation, and is significant without its neighbours. The surfaces beside
+        // it do not meet: they form no crease.
+        const double error = jump_tolerances * std::max(line.tolerance_at(cut.before), line.tolerance_at(cut.after));
+        const bool jumps = jump > 0 && std::abs(yf - yg) > error && jump_significance > jump_alone;
+        if (jumps) crease = crease_significance = 0;
+
         Candidate c{};
         c.x = static_cast<float>(line.path.col + cut.sample * line.path.dcol);
         c.y = static_cast<float>(line.path.row + cut.sample * line.path.drow);
@@ -112,11 +141,10 @@ private:
         c.crease = static_cast<float>(crease);
         const double significance = jump > 0 ? std::max(jump_significance, crease_significance) : crease_significance;
         c.significance = std::min(static_cast<float>(significance), endless);
-        // A jump exceeds the error of the approximation, and is significant without its neighbours.
-        const double error = jump_tolerances * std::max(line.tolerance_at(cut.before), line.tolerance_at(cut.after));
-        if (jump > 0 && std::abs(yf - yg) > error && jump_significance > jump_alone)
-            c.kind |= static_cast<std::uint8_t>(jump_bit | (yf > yg ? occluding_bit : occluded_bit));
-        if (crease > 0) c.kind |= cross > 0 ? convex_bit : concave_bit;  // the tangent turns away from the viewer
+        if (jumps)
+            c.kind = static_cast<std::uint8_t>(jump_bit | (yf > yg ? occluding_bit : occluded_bit));
+        else if (crease > 0)
+            c.kind = cross > 0 ? convex_bit : concave_bit;  // the tangent turns away from the viewer
         c.direction = static_cast<std::uint8_t>(direction_);
         c.before = static_cast<std::int32_t>(line.path.pixel(cut.before, cols_));
         c.after = static_cast<std::int32_t>(line.path.pixel(cut.after, cols_));
@@ -127,6 +155,16 @@ private:
         c.place[0] = static_cast<float>(w * line.along[0] - line.across * line.along[1]);
         c.place[1] = static_cast<float>(w * line.along[1] + line.across * line.along[0]);
         return c;
+    }
+
+    // Between the depths at the samples beside the cut, and what either curve adds to them on the way to it: no more
+    // than it changes over the last sample before. Over a wide gap, or close to the horizon, a curve runs away.
+    static double largest_jump(const Line<T>& line, const Curve& f, const Curve& g, const Cut& cut) {
+        const double xf = line.abscissa(cut.before), xg = line.abscissa(cut.after);
+        const double zf = line.depth(f.value(xf)), zg = line.depth(g.value(xg));
+        const double spacing = (xg - xf) / (cut.after - cut.before), reach = std::min(spacing, (xg - xf) / 2);
+        return std::abs(zf - zg) + std::abs(zf - line.depth(f.value(xf - reach))) +
+               std::abs(zg - line.depth(g.value(xg + reach)));
     }
 
     static Side side(const Line<T>& line, double value, double slope, double variance) {
@@ -191,20 +229,28 @@ void put_in_order(std::vector<Candidate>& candidates) {
 
 void combine(const std::vector<Candidate>& candidates, float* jump, float* crease, std::uint8_t* kind,
              float* significance) {
-    for (const Candidate& c : candidates) {
+    constexpr int jump_bits = jump_bit | occluding_bit | occluded_bit, crease_bits = convex_bit | concave_bit;
+    for (const Candidate& c : candidates)
         for (const std::int32_t p : {c.before, c.after}) {
-            const bool nearer = ((c.kind & occluding_bit) != 0) == (p == c.before);
-            if (c.kind & jump_bit)
-                kind[p] = static_cast<std::uint8_t>(kind[p] | jump_bit | (nearer ? occluding_bit : occluded_bit));
-            if (c.crease > crease[p] || (c.crease > 0 && c.crease == crease[p] && (c.kind & convex_bit))) {
-                crease[p] = c.crease;
-                const int other = kind[p] & ~(convex_bit | concave_bit);
-                kind[p] = static_cast<std::uint8_t>(other | (c.kind & (convex_bit | concave_bit)));
-            }
             jump[p] = std::max(jump[p], c.jump);
+            if (!(c.kind & jump_bit)) continue;
+            const bool nearer = ((c.kind & occluding_bit) != 0) == (p == c.before);
+            kind[p] = static_cast<std::uint8_t>(kind[p] | jump_bit | (nearer ? occluding_bit : occluded_bit));
             significance[p] = std::max(significance[p], c.significance);
         }
-    }
+    // Surfaces either meet at a pixel or do not: of jumps and creases there, the most significant candidate decides.
+    for (const Candidate& c : candidates)
+        for (const std::int32_t p : {c.before, c.after})
+            if (c.crease > 0 && c.significance > significance[p]) kind[p] = static_cast<std::uint8_t>(kind[p] & ~jump_bits);
+    for (const Candidate& c : candidates)
+        for (const std::int32_t p : {c.before, c.after}) {
+            if (kind[p] & jump_bit) continue;
+            significance[p] = std::max(significance[p], c.significance);
+            if (c.crease > crease[p] || (c.crease > 0 && c.crease == crease[p] && (c.kind & convex_bit))) {
+                crease[p] = c.crease;
+                kind[p] = static_cast<std::uint8_t>((kind[p] & ~crease_bits) | (c.kind & crease_bits));
+            }
+        }
 }
 
 template std::vector<Candidate> detect(const RangeImage<float>&, const Noise&, const Parameters&);
