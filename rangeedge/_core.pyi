@@ -21,6 +21,8 @@ class Parameters:
         normals: bool,
         max_shift: float,
         max_gap: int,
+        max_smear: int,
+        spaced: bool,
         merge_significance: float,
         min_significance: float,
         threads: int,

@@ -17,6 +17,7 @@ namespace {
 
 constexpr double lone_significance = 3;  // of a candidate by itself, before its neighbours are asked
 constexpr double jump_alone = 12;        // significance of a jump
+constexpr double least_third = 0.5;      // third differences of a jump, as a share of those of an even ramp
 constexpr double jump_tolerances = 2;    // what tells a jump from the approximation's own error
 
 // Where an edge is: between two samples, at an abscissa, also counted in samples.
@@ -25,6 +26,7 @@ struct Cut {
     double abscissa, sample;
     double shift;  // samples that it was moved
     bool meeting;  // the two curves meet here: no jump
+    int steps;     // from sample to sample, between the two curves
 };
 
 template <class T>
@@ -67,7 +69,8 @@ private:
         const Smear smear = smear_after(line, a, i, parameters_);
         if (smear.next == i) return i;
         const double xa = line.abscissa(smear.before), xb = line.abscissa(smear.after);
-        const Cut cut{smear.before, smear.after, (xa + xb) / 2, (smear.before + smear.after) / 2.0, 0, false};
+        const Cut cut{smear.before, smear.after, (xa + xb) / 2, (smear.before + smear.after) / 2.0, 0, false,
+                      a.segments[smear.next].first - a.segments[i].last};
         candidate = measure(line, a.curves[i], a.curves[smear.next], cut);
         return candidate.kind & jump_bit ? smear.next : i;
     }
@@ -77,10 +80,10 @@ private:
     Cut adapted_position(const Line<T>& line, const Approximation& a, std::size_t i) const {
         const Segment &left = a.segments[i], &right = a.segments[i + 1];
         const double xa = line.abscissa(left.last), xb = line.abscissa(right.first);
-        const Cut cut{left.last, right.first, (xa + xb) / 2, (left.last + right.first) / 2.0, 0, false};
+        const Cut cut{left.last, right.first, (xa + xb) / 2, (left.last + right.first) / 2.0, 0, false, right.first - left.last};
         const auto meeting = [&](int before, int after, double x, double sample) {
             const double shift = sample - cut.sample;
-            return std::abs(shift) > parameters_.max_shift ? cut : Cut{before, after, x, sample, shift, true};
+            return std::abs(shift) > parameters_.max_shift ? cut : Cut{before, after, x, sample, shift, true, 1};
         };
         const double reach = line.x ? HUGE_VAL : parameters_.max_shift + 1;
         double x = 0;
@@ -131,7 +134,10 @@ private:
         // it do not meet: they form no crease.
         const double error = jump_tolerances * std::max(line.tolerance_at(cut.before), line.tolerance_at(cut.after));
         const bool jumps = jump > 0 && std::abs(yf - yg) > error && jump_significance > jump_alone;
-        if (jumps) crease = crease_significance = 0;
+        if (jumps && smooth_across(line, cut, std::abs(yf - yg)))
+            jump = jump_significance = 0;
+        else if (jumps)
+            crease = crease_significance = 0;
 
         Candidate c{};
         c.x = static_cast<float>(line.path.col + cut.sample * line.path.dcol);
@@ -141,7 +147,7 @@ private:
         c.crease = static_cast<float>(crease);
         const double significance = jump > 0 ? std::max(jump_significance, crease_significance) : crease_significance;
         c.significance = std::min(static_cast<float>(significance), endless);
-        if (jumps)
+        if (jumps && jump > 0)
             c.kind = static_cast<std::uint8_t>(jump_bit | (yf > yg ? occluding_bit : occluded_bit));
         else if (crease > 0)
             c.kind = cross > 0 ? convex_bit : concave_bit;  // the tangent turns away from the viewer
@@ -155,6 +161,19 @@ private:
         c.place[0] = static_cast<float>(w * line.along[0] - line.across * line.along[1]);
         c.place[1] = static_cast<float>(w * line.along[1] + line.across * line.along[0]);
         return c;
+    }
+
+    // Whether the samples across the cut run on too smoothly for a step of that size, which curves that do not quite
+    // follow them pretend: a ramp over n samples has third differences of step / n, and a sharper one larger ones.
+    static bool smooth_across(const Line<T>& line, const Cut& cut, double step) {
+        const int first = std::max(cut.before - 2, 0), last = std::min(cut.after + 2, line.path.size - 1);
+        double most = 0;
+        for (int k = first; k + 3 <= last; ++k) {
+            const double third = line.ordinate(k + 3) - 3 * (line.ordinate(k + 2) - line.ordinate(k + 1)) - line.ordinate(k);
+            if (!(std::abs(third) <= HUGE_VAL)) return false;  // no data
+            most = std::max(most, std::abs(third));
+        }
+        return last - first >= 3 && most < least_third * step / cut.steps;
     }
 
     // Between the depths at the samples beside the cut, and what either curve adds to them on the way to it: no more
