@@ -181,8 +181,10 @@ def splitScanLine(z: np.ndarray, eps: float, pixelSize: float | np.ndarray = 1.0
 
     The quadratic through both end points and the midpoint of a run approximates it; where the largest residual
     |z - f(x)| exceeds `eps` the run is cut, and both parts are treated the same way. The cut falls between two
-    samples: the extreme one joins the neighbour whose value is closer, the left one of two equals. The midpoint of
-    a run with an even number of samples is the left one of the two.
+    samples: the extreme one joins the neighbour whose value is closer. No side is preferred, so that a reversed line is
+    cut at the same places: of two samples in the middle, the one closer to the straight line between the ends is the
+    midpoint, and where they are equally far on either side of it that line is the curve; of equally extreme samples the one closer to the middle counts, or both; of equally close neighbours the
+    one farther from the middle is joined.
 
     Parameters
     ----------

@@ -35,7 +35,9 @@ from rangeedge import (
 REFINEMENTS = ("merged", "dissolved")  # of least-squares approximations, in this order
 CURVED_SIGNIFICANCE = 5.0  # of the quadratic term
 STRADDLING = 2.0  # how much more, in significance, a segment across an edge may cost
+TIE_COST = 1e-6  # of a cut, a sample
 LONE_SIGNIFICANCE = 3.0
+LEAST_THIRD = 0.5  # third differences of a jump, as a share of those of an even ramp
 JUMP_TOLERANCES, JUMP_ALONE = 2.0, 12.0
 REACH, CAPPED, LONE_SHARE = 4.0, 8.0, 1 / 3  # pixels; standard deviations
 LEAST_SLOPE = 0.3
@@ -79,23 +81,52 @@ def _runs(y, x):
 def _split_run(y, x, eps, scale, first, last):
     if last - first + 1 <= 3:
         return [(first, last)]
-    m = (first + last) // 2
-    left, right = x[m] - x[first], x[last] - x[m]
-    slope_left, slope_right = (y[m] - y[first]) / left, (y[last] - y[m]) / right
-    a = (slope_right - slope_left) / (left + right)
-    b = slope_left + a * left
-    worst, k = -math.inf, first
+    m = midpoint(y, x, first, last)
+    left, right, inverse = x[m] - x[first], x[last] - x[m], 1 / (x[last] - x[first])
+    if m == first:
+        a, b = y.dtype.type(0), (y[last] - y[first]) * inverse
+    else:
+        slope_left, slope_right = (y[m] - y[first]) / left, (y[last] - y[m]) / right
+        a = (slope_right - slope_left) * inverse
+        b = (slope_left * right + slope_right * left) * inverse
+    residuals = []
     for i in range(first + 1, last):
         t = x[i] - x[m]
         residual = abs(y[i] - (y[m] + t * (b + a * t)))
-        if scale is not None:
-            residual = residual * scale[i]
-        if residual > worst:
-            worst, k = residual, i
+        residuals.append(residual if scale is None else residual * scale[i])
+    worst = np.nanmax(residuals)
     if not worst > eps:
         return [(first, last)]
-    cut = k if abs(y[k] - y[k - 1]) <= abs(y[k + 1] - y[k]) else k - 1  # the last sample before it
-    return _split_run(y, x, eps, scale, first, cut) + _split_run(y, x, eps, scale, cut + 1, last)
+    extreme = [first + 1 + i for i, residual in enumerate(residuals) if residual == worst]
+    outer = {extreme[0], extreme[-1]}
+    nearest = min(abs(2 * k - first - last) for k in outer)
+    cuts = {_cut_at(y, first, last, k) for k in outer if abs(2 * k - first - last) == nearest}
+    bounds = [first - 1, *sorted(cuts), last]
+    return [s for a, b in pairwise(bounds) for s in _split_run(y, x, eps, scale, a + 1, b)]
+
+
+def _cut_at(y, first, last, k):
+    """The last sample before the cut beside an extreme sample."""
+    left, right = abs(y[k] - y[k - 1]), abs(y[k + 1] - y[k])
+    return k if left < right or (left == right and k < (first + last) / 2) else k - 1
+
+
+def midpoint(y, x, first, last):
+    """The middle sample, or that of two which is closer to the straight line between the ends.
+
+    The first sample where they are equally far on either side of it: then that line is the curve.
+    """
+    (m, n), slope = middles(first, last), (y[last] - y[first]) / (x[last] - x[first])
+    left = y[m] - y[first] - slope * (x[m] - x[first])
+    right = y[n] - y[last] + slope * (x[last] - x[n])
+    if m < n and left == -right and left != 0:
+        return first
+    return n if abs(right) < abs(left) else m
+
+
+def middles(first, last):
+    """The two samples in the middle, which are one where their number is odd."""
+    return (first + last) // 2, (first + last + 1) // 2
 
 
 # Curves.
@@ -185,6 +216,10 @@ class Line:
     tolerance: np.ndarray
     scale: np.ndarray | None  # inverse tolerances, where they differ
     place: Any = None  # abscissa to the position (X, Y) in the plane of the image
+
+    def sigma_in(self, s):
+        """In the middle of a segment."""
+        return self.sigma[list(middles(s.first, s.last))].mean()
 
     def height(self, y):
         """The depth of an ordinate, or a height."""
@@ -392,8 +427,10 @@ class Detector:
         segments = self.segments(line)
         if self.p.fit == FIT_INTERP:
             for s in segments:
-                k = np.unique([s.first, (s.first + s.last) // 2, s.last])
-                s.curve = fitted(_doubles(line.x, k), _doubles(line.y, k), len(k) - 1)
+                k = {s.first, s.last}
+                if s.size > 2:
+                    k.add(midpoint(line.y, line.x, s.first, s.last))
+                s.curve = fitted(_doubles(line.x, sorted(k)), _doubles(line.y, sorted(k)), len(k) - 1)
         else:
             for s in segments:
                 s.curve = self._fit(line, s)
@@ -449,7 +486,7 @@ class Detector:
 
     def _fit(self, line, s):
         k = np.arange(s.first, s.last + 1)
-        sigma = line.sigma[s.first + s.size // 2]
+        sigma = line.sigma_in(s)
         return least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
 
     def _merged(self, line, segments):
@@ -470,36 +507,43 @@ class Detector:
         """By how much one curve for both raises the sum of squared residuals, in variances of the noise."""
         if not _adjacent(line, left, right):
             return math.inf
-        k, sigma = np.arange(left.first, right.last + 1), line.sigma[left.last]
+        k, sigma = np.arange(left.first, right.last + 1), line.sigma[[left.last, right.first]].mean()
         one = least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
-        return (one.sum_squares - left.curve.sum_squares - right.curve.sum_squares) / sigma**2
+        rise = (one.sum_squares - left.curve.sum_squares - right.curve.sum_squares) / sigma**2
+        return rise + TIE_COST * len(k)
 
     def _dissolved(self, line, segments):
+        """In every round, segments go that cost less than the others up to two away."""
         segments = list(segments)
-        i = 1
-        while i + 1 < len(segments):
-            pair = self._without(line, *segments[i - 1 : i + 2])
-            if pair is None:
-                i += 1
-            else:
-                segments[i - 1 : i + 2] = pair
-                i = max(1, i - 1)
-        return segments
+        while True:
+            parts = [self._without(line, *segments[i - 1 : i + 2]) for i in range(1, len(segments) - 1)]
+            costs = [math.inf] * 3 + [cost for cost, _ in parts] + [math.inf] * 3
+            chosen = [
+                i
+                for i in range(1, len(segments) - 1)
+                if costs[i + 2] < min(costs[i : i + 2]) and costs[i + 2] <= min(costs[i + 3 : i + 5])
+            ]
+            if not chosen:
+                return segments
+            for i in reversed(chosen):
+                segments[i - 1 : i + 2] = parts[i - 1][1]
 
     def _without(self, line, left, s, right):
-        """The outer two of three segments with the samples of the middle one, or None."""
+        """What it costs to take out the middle one of three segments, and what the outer two then are."""
+        stays = math.inf, None
         if not _adjacent(line, left, s) or not _adjacent(line, s, right):
-            return None
+            return stays
         x = meeting(left.curve, right.curve, (float(line.x[s.first]) + float(line.x[s.last])) / 2)
         if x is None or not line.x[s.first - 1] <= x <= line.x[s.last + 1]:
-            return None
+            return stays
         cut = max([s.first - 1] + [k for k in range(s.first, s.last + 1) if line.x[k] <= x])
-        pair, sigma = [Segment(left.first, cut), Segment(cut + 1, right.last)], line.sigma[s.first + s.size // 2]
+        pair, sigma = [Segment(left.first, cut), Segment(cut + 1, right.last)], line.sigma_in(s)
         for part in pair:
             k = np.arange(part.first, part.last + 1)
             part.curve = least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
         rise = sum(p.curve.sum_squares for p in pair) - sum(p.curve.sum_squares for p in (left, s, right))
-        return pair if rise < (STRADDLING * self.p.mergeSignificance * sigma) ** 2 else None
+        cost = rise / sigma**2
+        return (cost, pair) if cost < (STRADDLING * self.p.mergeSignificance) ** 2 else stays
 
     def _position(self, line, left, right):
         """Pixels before and after the edge, its abscissa, its place in samples, and whether the curves meet there."""
@@ -560,8 +604,11 @@ class Detector:
         kind = 0
         error = JUMP_TOLERANCES * max(line.tolerance[before], line.tolerance[after])
         if jump > 0 and abs(yf - yg) > error and jump_significance > JUMP_ALONE:
-            kind |= EDGE_JUMP | (EDGE_OCCLUDING if yf > yg else EDGE_OCCLUDED)
-            crease = 0.0
+            if _smooth(line.y[max(before - 2, 0) : after + 3], abs(yf - yg) / (right.first - left.last)):
+                jump = 0.0
+            else:
+                kind |= EDGE_JUMP | (EDGE_OCCLUDING if yf > yg else EDGE_OCCLUDED)
+                crease = 0.0
         if crease > 0:
             kind |= EDGE_CONVEX if bend > 0 else EDGE_CONCAVE
         (u, v), (dx, dy) = line.pixels[0], STEPS[line.direction]
@@ -582,6 +629,12 @@ class Detector:
             along=along / unit,
             sides=[(value, slope / unit, variance / unit**2) for value, slope, variance in sides],
         )
+
+
+def _smooth(y, ramp):
+    """Whether samples run on too smoothly for a step that climbs so much from one to the next."""
+    thirds = np.abs(np.diff(y.astype(np.float64), 3))
+    return bool(np.isfinite(y).all()) and len(thirds) > 0 and thirds.max() < LEAST_THIRD * ramp
 
 
 def _doubles(values, k):

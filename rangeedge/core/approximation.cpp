@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <type_traits>
+#include <utility>
 
 #include "simd.hpp"
 
@@ -10,6 +12,7 @@ namespace rangeedge {
 namespace {
 
 constexpr double curved_significance = 5;  // of the quadratic term of a least-squares fit
+constexpr double tie = 1e-6;                // of a cost, a sample
 constexpr double straddling = 2;           // how much more, in significance, a segment across an edge may cost
 
 // As many numbers, or a few more, as are computed side by side.
@@ -58,8 +61,21 @@ inline Projections projections_of(double n, double base, const Sums& s) {
 
 int middle(const Segment& s) { return s.first + s.size() / 2; }
 
-double cost_of(double residual, double left, double right, double sigma) {
-    const double cost = (residual - left - right) / (sigma * sigma);
+template <class T>
+Samples<T> samples_of(const Line<T>& line) {
+    return {line.y, line.x, line.scale, line.path.size, static_cast<T>(line.tolerance)};
+}
+
+// Of the noise in the middle of a segment.
+template <class T>
+double sigma_in(const Line<T>& line, const Segment& s) {
+    const int half = (s.size() - 1) / 2;
+    return (line.sigma_at(s.first + half) + line.sigma_at(s.last - half)) / 2;
+}
+
+// Of joining two segments, with n samples together: of equal costs, rounding included, that of fewer samples is lower.
+double cost_of(double residual, double left, double right, double sigma, double n) {
+    const double cost = (residual - left - right) / (sigma * sigma) + tie * n;
     return sigma > 0 && cost == cost ? cost : HUGE_VAL;
 }
 
@@ -87,7 +103,7 @@ void cost_all(std::size_t count, const Columns left, const Columns right, const 
     RANGEEDGE_INDEPENDENT
     for (std::size_t i = 0; i < count; ++i) {
         const double one = residual_squares(joined(left[i], right[i]), curved_significance * sigma[i]);
-        cost[i] = cost_of(one, left.residual[i], right.residual[i], sigma[i]);
+        cost[i] = cost_of(one, left.residual[i], right.residual[i], sigma[i], left.n[i] + right.n[i]);
     }
 }
 
@@ -129,11 +145,22 @@ public:
     }
 
     // Splitting may leave a segment across an edge, its rounding included, where one cut would do. It is taken out
-    // where the curves beside it meet within it and, given its samples, explain them nearly as well.
+    // where the curves beside it meet within it and, given its samples, explain them nearly as well. In every round
+    // those go that cost less than any other of the segments that it would change.
     void dissolve(std::vector<Curve>& curves) {
-        for (int i = next(0); i != end_ && next(i) != end_;) {
-            const int before = previous(i), after = next(i);
-            i = !dissolved(i, curves) || previous(before) == end_ ? after : before;
+        std::vector<int>&changed = cuts_, &open = chosen_;
+        changed.clear(), open.clear();
+        for (int i = next(end_); i != end_; i = next(i)) changed.push_back(i);
+        while (!changed.empty()) {
+            for (const int i : changed) {
+                cost(i) = parts_without(i, curves).cost;
+                if (cost(i) < HUGE_VAL && !chosen(i)) open.push_back(i);
+                chosen(i) |= cost(i) < HUGE_VAL;
+            }
+            changed.clear();
+            const auto kept = std::partition(open.begin(), open.end(), [&](int i) { return !cheapest_of_five(i); });
+            for (auto i = kept; i != open.end(); ++i) take_out(*i, curves, changed);
+            open.erase(kept, open.end());
         }
     }
 
@@ -147,7 +174,7 @@ private:
     double& residual(int i) { return pieces_.residual[static_cast<std::size_t>(i)]; }
     double& cost(int i) { return pieces_.cost[static_cast<std::size_t>(i)]; }
     const Line<T>& line_of(int i) { return lines_[static_cast<std::size_t>(link(i).line)]; }
-    double sigma_of(int i) { return line_of(i).sigma_at(middle(segment(i))); }
+    double sigma_of(int i) { return sigma_in(line_of(i), segment(i)); }
 
     // Of all cuts those that cost less than the ones beside them, of equals the leftmost. Without branches: which these
     // are cannot be foretold.
@@ -177,33 +204,57 @@ private:
         previous(next(i)) = previous(i);
     }
 
-    bool dissolved(int i, std::vector<Curve>& curves) {
+    // What becomes of the segments beside one that is taken out: where they meet, and their sums.
+    using Sums = std::decay_t<decltype(std::declval<const P&>().sums(0))>;
+    struct Parts {
+        int cut = 0;
+        Sums left{}, right{};
+        double cost = HUGE_VAL;  // how much less significant the three are; infinite where the segment stays
+    };
+
+    Parts parts_without(int i, const std::vector<Curve>& curves) {
         const int before = previous(i), after = next(i);
-        if (!(sigma(before) > 0 && sigma(i) > 0)) return false;  // not adjacent
+        if (before == end_ || after == end_ || !(sigma(before) > 0 && sigma(i) > 0)) return {};  // not adjacent
         const Segment s = segment(i);
         const Line<T>& line = line_of(i);
-        Curve &f = curves[static_cast<std::size_t>(before)], &g = curves[static_cast<std::size_t>(after)];
+        const Curve &f = curves[static_cast<std::size_t>(before)], &g = curves[static_cast<std::size_t>(after)];
         const double begin = line.abscissa(s.first - 1), end = line.abscissa(s.last + 1);
         const double near = (line.abscissa(s.first) + line.abscissa(s.last)) / 2;
         double x = 0;
-        if (!intersection(f, g, near, std::max(near - begin, end - near), x)) return false;
-        if (x < begin || x > end) return false;
-        int cut = s.first - 1;
-        while (cut < s.last && line.abscissa(cut + 1) <= x) ++cut;
-        auto left = pieces_.sums(before), right = pieces_.sums(after);
-        if (cut >= s.first) left = joined(left, P::sums_over(line, {s.first, cut}));
-        if (cut < s.last) right = joined(P::sums_over(line, {cut + 1, s.last}), right);
+        if (!intersection(f, g, near, std::max(near - begin, end - near), x)) return {};
+        if (x < begin || x > end) return {};
+        Parts parts;
+        parts.cut = s.first - 1;
+        while (parts.cut < s.last && line.abscissa(parts.cut + 1) <= x) ++parts.cut;
+        parts.left = pieces_.sums(before), parts.right = pieces_.sums(after);
+        if (parts.cut >= s.first) parts.left = joined(parts.left, P::sums_over(line, {s.first, parts.cut}));
+        if (parts.cut < s.last) parts.right = joined(P::sums_over(line, {parts.cut + 1, s.last}), parts.right);
         const double v = sigma_of(i), least = curved_significance * v;
-        const double cost = residual_squares(left, least) + residual_squares(right, least) -
+        const double rise = residual_squares(parts.left, least) + residual_squares(parts.right, least) -
                             (residual(before) + residual(i) + residual(after));
-        if (!(cost < straddling * straddling * limit_ * v * v)) return false;
-        segment(before).last = cut;
-        segment(after).first = cut + 1;
-        set_sums(before, left, v);
-        set_sums(after, right, v);
+        const double cost = rise / (v * v);
+        if (cost < straddling * straddling * limit_) parts.cost = cost;
+        return parts;
+    }
+
+    bool cheapest_of_five(int i) {
+        const int before = previous(i), after = next(i);
+        return cost(i) < HUGE_VAL && cost(i) < cost(before) && cost(i) < cost(previous(before)) &&
+               cost(i) <= cost(after) && cost(i) <= cost(next(after));
+    }
+
+    void take_out(int i, std::vector<Curve>& curves, std::vector<int>& changed) {
+        const Parts parts = parts_without(i, curves);
+        const int before = previous(i), after = next(i);
+        const double v = sigma_of(i);
+        segment(before).last = parts.cut;
+        segment(after).first = parts.cut + 1;
+        set_sums(before, parts.left, v);
+        set_sums(after, parts.right, v);
         remove(i);
-        f = pieces_.curve(before), g = pieces_.curve(after);
-        return true;
+        for (const int k : {before, after}) curves[static_cast<std::size_t>(k)] = pieces_.curve(k);
+        for (const int k : {previous(before), before, after, next(after)})
+            if (k != end_) changed.push_back(k);
     }
 
     const std::vector<Line<T>>& lines_;
@@ -321,7 +372,7 @@ void UnevenPieces::price(std::size_t i) {
     if (!(sigma[i] > 0)) return;
     const auto right = static_cast<std::size_t>(links[i].next);
     const double one = residual_squares(joined(sums_[i], sums_[right]), curved_significance * sigma[i]);
-    cost[i] = cost_of(one, residual[i], residual[right], sigma[i]);
+    cost[i] = cost_of(one, residual[i], residual[right], sigma[i], sums_[i].n + sums_[right].n);
 }
 
 Curve UnevenPieces::curve(int i) const {
@@ -355,7 +406,7 @@ template <class T>
 void Approximator<T>::split(const Strip<T>& strip) {
     splitter_.clear();
     for (const Line<T>& line : strip.lines)
-        splitter_.add({line.y, line.x, line.scale, line.path.size, static_cast<T>(line.tolerance)});
+        splitter_.add(samples_of(line));
     splitter_.split();
     segments_.clear();
     curves_.clear();
@@ -372,7 +423,7 @@ void Approximator<T>::interpolate(const Strip<T>& strip) {
         for (std::size_t j = starts_[i]; j < starts_[i + 1]; ++j) {
             const Line<T>& line = strip.lines[i];
             const Segment s = segments_[j];
-            const int m = s.first + (s.last - s.first) / 2;
+            const int m = midpoint(samples_of(line), s);
             Moments moments;
             moments.origin = line.abscissa(m);
             moments.base = line.ordinate(m);
@@ -398,8 +449,8 @@ void Approximator<T>::fit(const Strip<T>& strip, P& pieces) {
                                   line.abscissa(s.last) < line.abscissa(s.last + 1);
             const int own = static_cast<int>(k);
             pieces.links[k] = {s, static_cast<int>(i), k > 0 ? own - 1 : pieces.end(), own + 1, false};
-            pieces.sigma[k] = adjacent ? line.sigma_at(s.last) : 0;
-            pieces.least[k] = curved_significance * line.sigma_at(middle(s));
+            pieces.sigma[k] = adjacent ? (line.sigma_at(s.last) + line.sigma_at(s.last + 1)) / 2 : 0;
+            pieces.least[k] = curved_significance * sigma_in(line, s);
         }
     pieces.fit(strip.lines);
     const double limit = parameters_.merge_significance * parameters_.merge_significance;

@@ -54,16 +54,19 @@ struct ThreePoint {
     int m;
     T origin, ym, a, b;
 
-    ThreePoint(const Samples<T>& line, const Segment& s) {
-        m = s.first + (s.last - s.first) / 2;
-        const T left = line.x ? line.x[m] - line.x[s.first] : static_cast<T>(m - s.first);
-        const T right = line.x ? line.x[s.last] - line.x[m] : static_cast<T>(s.last - m);
-        const T slope_left = (line.y[m] - line.y[s.first]) / left;
-        const T slope_right = (line.y[s.last] - line.y[m]) / right;
+    ThreePoint(const Samples<T>& line, const Segment& s) : m(midpoint(line, s)) {
         origin = line.x ? line.x[m] : static_cast<T>(m);
         ym = line.y[m];
-        a = (slope_right - slope_left) / (left + right);
-        b = slope_left + a * left;
+        const T left = line.width(s.first, m), right = line.width(m, s.last), inverse = 1 / line.width(s.first, s.last);
+        if (m == s.first) {
+            a = 0;
+            b = (line.y[s.last] - line.y[m]) * inverse;
+            return;
+        }
+        const T slope_left = (line.y[m] - line.y[s.first]) / left;
+        const T slope_right = (line.y[s.last] - line.y[m]) / right;
+        a = (slope_right - slope_left) * inverse;
+        b = (slope_left * right + slope_right * left) * inverse;
     }
     T residual(T x, T y) const {
         const T t = x - origin;
@@ -71,29 +74,35 @@ struct ThreePoint {
     }
 };
 
-// Where the largest residual is, if it exceeds the line's eps; else -1.
+// The first and the last of some samples; first < 0 where there are none.
+struct Ends {
+    int first, last;
+};
+
+// Where the residual is largest, if it exceeds the line's eps.
 template <class T>
-int worst_of(const Samples<T>& line, const Segment& s) {
+Ends worst_of(const Samples<T>& line, const Segment& s) {
     const ThreePoint<T> curve(line, s);
     T most = line.eps;
-    int at = -1;
+    Ends at{-1, -1};
     for (int k = s.first + 1; k < s.last; ++k) {
         T r = curve.residual(line.x ? line.x[k] : static_cast<T>(k), line.y[k]);
         if (line.scale) r *= line.scale[k];
-        if (r > most) most = r, at = k;
+        if (r > most) most = r, at = {k, k};
+        else if (r == most && at.first >= 0) at.last = k;
     }
     return at;
 }
 
 // The same for samples one unit apart, sixteen at a time: each lane keeps its own worst.
 template <int bytes>
-RANGEEDGE_INLINE int worst_in_lanes(const Samples<float>& line, const Segment& s) {
+RANGEEDGE_INLINE Ends worst_in_lanes(const Samples<float>& line, const Segment& s) {
     using F = Floats<bytes>;
     using I = Ints<bytes>;
     const ThreePoint<float> curve(line, s);
     const F ym = F::all(curve.ym), a = F::all(curve.a), b = F::all(curve.b);
     F worst = F::all(-1);
-    I at = I::all(s.last);
+    I at = I::all(s.last), last = I::all(-1);
     const auto look = [&](int k, int count) RANGEEDGE_ALWAYS {
         const F t = F::from(static_cast<float>(k - curve.m));
         F r = magnitude(F::load(line.y + k) - (ym + t * (b + a * t)));
@@ -101,21 +110,27 @@ RANGEEDGE_INLINE int worst_in_lanes(const Samples<float>& line, const Segment& s
         if (count < F::count) r = first_lanes(r, count);
         const I index = I::from(k);
         for (int p = 0; p < F::parts; ++p) {
-            const auto larger = r.part[p] > worst.part[p];
+            const auto larger = r.part[p] > worst.part[p], as_large = r.part[p] >= worst.part[p];
             worst.part[p] = larger ? r.part[p] : worst.part[p];
             at.part[p] = larger ? index.part[p] : at.part[p];
+            last.part[p] = as_large ? index.part[p] : last.part[p];
         }
     };
     int k = s.first + 1;
     for (; k + F::count <= s.last; k += F::count) look(k, F::count);
     if (k < s.last) look(k, s.last - k);
     const float most = worst.joined([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; });
-    if (!(most > line.eps)) return -1;
+    if (!(most > line.eps)) return {-1, -1};
     // Across the lanes, without branches: which is the worst cannot be foretold.
     const F all_most = F::all(most);
-    const I beyond = I::all(s.last);
-    for (int p = 0; p < F::parts; ++p) at.part[p] = worst.part[p] == all_most.part[p] ? at.part[p] : beyond.part[p];
-    return at.joined([](auto p, auto q) RANGEEDGE_ALWAYS { return p < q ? p : q; });
+    const I beyond = I::all(s.last), before = I::all(-1);
+    for (int p = 0; p < F::parts; ++p) {
+        const auto here = worst.part[p] == all_most.part[p];
+        at.part[p] = here ? at.part[p] : beyond.part[p];
+        last.part[p] = here ? last.part[p] : before.part[p];
+    }
+    return {at.joined([](auto p, auto q) RANGEEDGE_ALWAYS { return p < q ? p : q; }),
+            last.joined([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; })};
 }
 
 // Of `count` pending nodes, those to be cut; returns how many. Lines without abscissae.
@@ -125,8 +140,8 @@ RANGEEDGE_INLINE std::size_t find_worst_in(const Samples<float>* lines, const Sp
     std::size_t found = 0;
     for (std::size_t i = 0; i < count; ++i) {
         const Splitter<float>::Node& node = nodes[pending[i]];
-        const int at = worst_in_lanes<bytes>(lines[node.line], node.segment);
-        if (at >= 0) worst[found++] = {pending[i], at};
+        const Ends at = worst_in_lanes<bytes>(lines[node.line], node.segment);
+        if (at.first >= 0) worst[found++] = {pending[i], at.first, at.last};
     }
     return found;
 }
@@ -134,6 +149,15 @@ RANGEEDGE_VERSIONS(std::size_t, find_worst,
                    (const Samples<float>* lines, const Splitter<float>::Node* nodes, const int* pending,
                     std::size_t count, Splitter<float>::Worst* worst),
                    (lines, nodes, pending, count, worst))
+
+// The sample behind which a segment is cut at an extreme one: that joins the neighbour it is closer to, of equally
+// close ones that farther from the middle.
+template <class T>
+int cut_at(const T* y, const Segment& s, int at) {
+    const T left = std::abs(y[at] - y[at - 1]), right = std::abs(y[at + 1] - y[at]);
+    const bool joins_left = left < right || (left == right && 2 * at < s.first + s.last);
+    return joins_left ? at : at - 1;
+}
 
 }  // namespace
 
@@ -173,8 +197,8 @@ void Splitter<T>::find_worst_of_pending() {
     std::size_t found = 0;
     for (const int i : pending_) {
         const Node& node = nodes_[static_cast<std::size_t>(i)];
-        const int at = worst_of(lines_[static_cast<std::size_t>(node.line)], node.segment);
-        if (at >= 0) worst_[found++] = {i, at};
+        const Ends at = worst_of(lines_[static_cast<std::size_t>(node.line)], node.segment);
+        if (at.first >= 0) worst_[found++] = {i, at.first, at.last};
     }
     worst_.resize(found);
 }
@@ -184,22 +208,34 @@ void Splitter<T>::split() {
     for (; !pending_.empty(); pending_.swap(following_)) {
         find_worst_of_pending();
         std::size_t count = nodes_.size(), follow = 0;
-        nodes_.resize(count + worst_.size());
-        following_.resize(2 * worst_.size());
-        for (const Worst& worst : worst_) {
-            Node& node = nodes_[static_cast<std::size_t>(worst.node)];
-            const T* y = lines_[static_cast<std::size_t>(node.line)].y + worst.at;
-            // The cut falls between two samples; the extreme one joins the neighbour it is closer to.
-            const bool joins_left = std::abs(y[0] - y[-1]) <= std::abs(y[1] - y[0]);
-            const int cut = joins_left ? worst.at : worst.at - 1, right = static_cast<int>(count);
-            nodes_[count++] = {{cut + 1, node.segment.last}, node.line, node.next};
-            following_[follow] = worst.node;
-            follow += static_cast<std::size_t>(cut - node.segment.first >= exact);
-            following_[follow] = right;
-            follow += static_cast<std::size_t>(node.segment.last - cut > exact);
+        nodes_.resize(count + 2 * worst_.size());
+        following_.resize(3 * worst_.size());
+        const auto cut_behind = [&](int i, int cut) {
+            Node& node = nodes_[static_cast<std::size_t>(i)];
+            const int right = static_cast<int>(count++);
+            nodes_[static_cast<std::size_t>(right)] = {{cut + 1, node.segment.last}, node.line, node.next};
             node.segment.last = cut;
             node.next = right;
+            return right;
+        };
+        const auto follow_up = [&](int i) {
+            following_[follow] = i;
+            follow += static_cast<std::size_t>(nodes_[static_cast<std::size_t>(i)].segment.size() > exact);
+        };
+        for (const Worst& worst : worst_) {
+            const Node& node = nodes_[static_cast<std::size_t>(worst.node)];
+            const T* y = lines_[static_cast<std::size_t>(node.line)].y;
+            // Of several the one closer to the middle, both where they are equally close: no side is preferred.
+            const Segment s = node.segment;
+            const int off = worst.first + worst.last - s.first - s.last;
+            const int left = cut_at(y, s, off < 0 ? worst.last : worst.first);
+            const int right = cut_at(y, s, off > 0 ? worst.first : worst.last);
+            const int behind = cut_behind(worst.node, left);
+            if (right > left) follow_up(cut_behind(behind, right));
+            follow_up(worst.node);
+            follow_up(behind);
         }
+        nodes_.resize(count);
         following_.resize(follow);
     }
 }

@@ -1,6 +1,7 @@
 // Scan line approximation (paper, section 4.1): one scan line, a curve in a plane, is split into segments.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cmath>
 #include <vector>
 
 namespace rangeedge {
@@ -47,7 +48,22 @@ struct Samples {
     const T* scale;
     int size;
     T eps;
+
+    T width(int i, int k) const { return x ? x[k] - x[i] : static_cast<T>(k - i); }
 };
+
+// The middle sample of a segment; of two, the one closer to the straight line between the ends, which is computed from
+// either end alike, so that no side is preferred. Where they lie equally far on either side of that line it is the curve
+// itself, and the first sample is returned.
+template <class T>
+int midpoint(const Samples<T>& line, const Segment& s) {
+    const int half = (s.last - s.first) / 2, m = s.first + half, n = s.last - half;
+    const T slope = (line.y[s.last] - line.y[s.first]) / line.width(s.first, s.last);
+    const T left = line.y[m] - line.y[s.first] - slope * line.width(s.first, m);
+    const T right = line.y[n] - line.y[s.last] + slope * line.width(n, s.last);
+    if (m < n && left == -right && left != 0) return s.first;
+    return std::abs(right) < std::abs(left) ? n : m;
+}
 
 // Splits runs of valid samples into segments whose residuals against the quadratic through both end points and the
 // midpoint stay within `eps`. Lines are split together, all segments of one generation in turn, so that a processor
@@ -71,9 +87,9 @@ public:
         Segment segment;
         int line, next;
     };
-    // A node to be cut, and where its residual is largest: the first of equals.
+    // A node to be cut, and where its residual is largest: the first and the last of equal ones.
     struct Worst {
-        int node, at;
+        int node, first, last;
     };
 
 private:
