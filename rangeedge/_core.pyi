@@ -22,6 +22,7 @@ class Parameters:
         max_shift: float,
         max_gap: int,
         max_smear: int,
+        shadows: bool,
         spaced: bool,
         merge_significance: float,
         min_significance: float,

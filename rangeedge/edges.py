@@ -68,6 +68,9 @@ class ScanLineParams:
         Most pixels of a scan line over which a step may be smeared, as interpolation and the footprint of a pixel do,
         to be one jump between the surfaces on either side. More than two are a surface of their own unless it is
         almost parallel to the viewing direction. 0 takes every pixel for a surface.
+    shadowEdges : bool
+        Whether a surface that ends at a gap wider than `maxGap`, in front of another one beyond it, has a jump at its end:
+        the outline of an object beside its shadow. A surface with a hole in it has none.
     mergeSignificance : float
         Cuts are taken back where that raises the sum of squared residuals by less than its square, in variances of the
         noise; a segment across an edge, or its rounding, is given to the surfaces beside it likewise. 0 keeps all.
@@ -101,6 +104,7 @@ class ScanLineParams:
     maxShift: float = 4.0
     maxGap: int = 8
     maxSmear: int = 5
+    shadowEdges: bool = True
     mergeSignificance: float = 5.0
     minSignificance: float = 12.0
 
@@ -110,7 +114,8 @@ class ScanLineParams:
             number(func, "eps", self.eps, 0, above=True)
         number(func, "epsFactor", self.epsFactor, 0, above=True)
         number(func, "depthFactor", self.depthFactor, 0, above=True)
-        boolean(func, "heightMap", self.heightMap)
+        for name in ("heightMap", "shadowEdges"):
+            boolean(func, name, getattr(self, name))
         integer(func, "directions", self.directions, 1, DIR_ALL)
         flag(func, "fit", self.fit, {"FIT_LSQ": FIT_LSQ, "FIT_INTERP": FIT_INTERP})
         measures = {"MEASURE_MIDPOINT": MEASURE_MIDPOINT, "MEASURE_ENDPOINT": MEASURE_ENDPOINT}
@@ -131,7 +136,14 @@ class ScanLineParams:
     @classmethod
     def paper(cls, **options: Any) -> ScanLineParams:
         """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept."""
-        basic = {"fit": FIT_INTERP, "crease": CREASE_MAX, "maxShift": 0.0, "maxGap": 0, "maxSmear": 0}
+        basic = {
+            "fit": FIT_INTERP,
+            "crease": CREASE_MAX,
+            "maxShift": 0.0,
+            "maxGap": 0,
+            "maxSmear": 0,
+            "shadowEdges": False,
+        }
         return cls(**{**basic, "mergeSignificance": 0.0, "minSignificance": 0.0, **options})
 
 
@@ -397,6 +409,7 @@ def _kernel_parameters(params: ScanLineParams, frame: RangeFrame) -> _core.Param
         max_shift=params.maxShift,
         max_gap=params.maxGap,
         max_smear=params.maxSmear,
+        shadows=params.shadowEdges,
         spaced=params.K is not None or params.pixelSize is not None or frame.samples.ndim == 3,
         merge_significance=params.mergeSignificance,
         min_significance=params.minSignificance,

@@ -37,13 +37,13 @@ CURVED_SIGNIFICANCE = 5.0  # of the quadratic term
 STRADDLING = 2.0  # how much more, in significance, a segment across an edge may cost
 TIE_COST = 1e-6  # of a cut, a sample
 LONE_SIGNIFICANCE = 3.0
-LEAST_THIRD = 0.5  # third differences of a jump, as a share of those of an even ramp
 JUMP_TOLERANCES, JUMP_ALONE = 2.0, 12.0
 REACH, CAPPED, LONE_SHARE = 4.0, 8.0, 1 / 3  # pixels; standard deviations
 LEAST_SLOPE = 0.3
 LEAST_SPREAD, LEAST_DIRECTIONS = 0.05, (0.02, 1e-9)
-ALWAYS_SMEARED, VEIL = 2, 20.0  # samples; degrees
-OVERSHOOT, OWN_SHARE, LEAST_RAMP = 0.1, 0.15, 0.5  # of a smeared step
+LEAST_OUTLINED = 3  # samples of a surface beside a wide gap
+SMEAR_ENDS, ALWAYS_SMEARED, VEIL = 4, 2, 20.0  # samples, samples, degrees
+OVERSHOOT, OWN_SHARE, LEAST_RAMP = 0.2, 0.15, 0.5  # of a smeared step
 SMALLEST = 1e-30
 
 TIE = 1e-5  # relative: closer comparisons count as decided by rounding
@@ -409,6 +409,7 @@ class Image:
 class Detector:
     def __init__(self, image: Image):
         self.image, self.p = image, image.params
+        self.smeared = set()  # pixels over which a step is smeared
 
     def candidates(self):
         found = []
@@ -416,7 +417,14 @@ class Detector:
             if self.p.directions & direction:
                 for pixels in paths(direction, *self.image.shape):
                     found += self._of_line(self.image.line(pixels, direction))
-        return Neighbourhood(found, self.image).pooled()
+        return Neighbourhood([c for c in found if not self._in_smear(c)], self.image).pooled()
+
+    def _in_smear(self, c):
+        """A jump whose nearer side is smeared, or a crease of which a pixel is smeared or beside one that is."""
+        if c.kind & EDGE_JUMP:
+            return c.pixels[0 if c.kind & EDGE_OCCLUDING else 1] in self.smeared
+        beside = {(u + i, v + j) for u, v in c.pixels for i in (-1, 0, 1) for j in (-1, 0, 1)}
+        return not beside.isdisjoint(self.smeared)
 
     def segments(self, line):
         eps = line.y.dtype.type(1 if line.scale is not None else np.nanmax(line.tolerance, initial=0))
@@ -445,7 +453,9 @@ class Detector:
 
     def _at_cut(self, line, left, right):
         gap = right.first - left.last - 1
-        if gap > self.p.maxGap or (gap and min(left.size, right.size) == 1):
+        if gap > self.p.maxGap:
+            return self._outline(line, left, right) if self.p.shadowEdges else None
+        if gap and min(left.size, right.size) == 1:
             return None
         return self._measured(line, left, right, *self._position(line, left, right))
 
@@ -457,7 +467,7 @@ class Detector:
         left, short, right = segments[i], segments[i + 1 : long[1]], segments[long[1]]
         samples = [k for s in short for k in range(s.first, s.last + 1)]
         gaps = [b.first - a.last - 1 for a, b in pairwise(segments[i : long[1] + 1])]
-        if len(samples) > self.p.maxSmear or max(gaps) > self.p.maxGap:
+        if len(samples) > self.p.maxSmear + SMEAR_ENDS or max(gaps) > self.p.maxGap:
             return None
         x = _doubles(line.x, samples)
         before, after = ([s.curve.value(t) for t in x] for s in (left, right))
@@ -478,11 +488,17 @@ class Detector:
         falling = [k for k, p in zip(samples, share, strict=True) if p < 1 - OWN_SHARE]
         a = max([left.last] + [k for k in samples if not rising or k < rising[0]])
         b = min([right.first] + [k for k in samples if not falling or k > falling[-1]])
-        if self.image.spaced and b - a - 1 > ALWAYS_SMEARED and line.grazing_angle(a, b) > VEIL:
+        smeared = [k for k in range(a + 1, b) if not math.isnan(line.y[k])]
+        if len(smeared) > self.p.maxSmear:
+            return None
+        if self.image.spaced and len(smeared) > ALWAYS_SMEARED and line.grazing_angle(a, b) > VEIL:
             return None
         middle = (float(line.x[a]) + float(line.x[b])) / 2
         candidate = self._measured(line, left, right, a, b, middle, (a + b) / 2, False)
-        return (candidate, long[1]) if candidate.kind & EDGE_JUMP else None
+        if not candidate.kind & EDGE_JUMP:
+            return None
+        self.smeared |= {line.pixels[k] for k in smeared}
+        return candidate, long[1]
 
     def _fit(self, line, s):
         k = np.arange(s.first, s.last + 1)
@@ -545,6 +561,41 @@ class Detector:
         cost = rise / sigma**2
         return (cost, pair) if cost < (STRADDLING * self.p.mergeSignificance) ** 2 else stays
 
+    def _outline(self, line, left, right):
+        """The jump at the end of the nearer of two surfaces beside a wide gap, or None."""
+        if min(left.size, right.size) < LEAST_OUTLINED:
+            return None
+        ends = [(float(line.x[s.last if s is left else s.first]), s.curve) for s in (left, right)]
+        (x, near), (x_far, far) = sorted(ends, key=lambda end: end[1].value(end[0]), reverse=True)
+        y, y_far, below = near.value(x), far.value(x_far), far.value(x)
+        a, b = left.last, right.first
+        if line.projective and not min(y, y_far, below) > 0:
+            return None
+        if self.image.spaced and line.grazing_angle(a, b) > VEIL:
+            return None
+        difference = min(y - below, y - y_far)
+        if not self.image.spaced:
+            difference = min(difference, near.value(x_far) - y_far)
+        significance = difference / (line.sigma[[a, b]].mean() * math.hypot(*_deviations(near, far, x)))
+        if not (significance > JUMP_ALONE and difference > JUMP_TOLERANCES * max(line.tolerance[[a, b]])):
+            return None
+        first = near is left.curve
+        sample, (u, v), (dx, dy) = a + 0.5 if first else b - 0.5, line.pixels[0], STEPS[line.direction]
+        return Candidate(
+            x=u + sample * dx,
+            y=v + sample * dy,
+            shift=0.0,
+            jump=min(abs(line.height(y) - line.height(other)) for other in (below, y_far)),
+            crease=0.0,
+            significance=significance,
+            kind=EDGE_JUMP | (EDGE_OCCLUDING if first else EDGE_OCCLUDED),
+            direction=line.direction,
+            pixels=(line.pixels[a], line.pixels[b]),
+            place=np.zeros(2),
+            along=np.zeros(2),
+            sides=[(0.0, 0.0, math.inf)] * 2,
+        )
+
     def _position(self, line, left, right):
         """Pixels before and after the edge, its abscissa, its place in samples, and whether the curves meet there."""
         a, b = left.last, right.first
@@ -604,7 +655,8 @@ class Detector:
         kind = 0
         error = JUMP_TOLERANCES * max(line.tolerance[before], line.tolerance[after])
         if jump > 0 and abs(yf - yg) > error and jump_significance > JUMP_ALONE:
-            if _smooth(line.y[max(before - 2, 0) : after + 3], abs(yf - yg) / (right.first - left.last)):
+            least = abs(yf - yg) / (2.5 * (right.first - left.last) - 1.5)
+            if _smooth(line.y[max(before - 2, 0) : after + 3], least):
                 jump = 0.0
             else:
                 kind |= EDGE_JUMP | (EDGE_OCCLUDING if yf > yg else EDGE_OCCLUDED)
@@ -631,10 +683,14 @@ class Detector:
         )
 
 
-def _smooth(y, ramp):
-    """Whether samples run on too smoothly for a step that climbs so much from one to the next."""
+def _deviations(f, g, x):
+    return math.sqrt(f.value_variance(x)), math.sqrt(g.value_variance(x))
+
+
+def _smooth(y, least):
+    """Whether samples have third differences, which all are smaller than that."""
     thirds = np.abs(np.diff(y.astype(np.float64), 3))
-    return bool(np.isfinite(y).all()) and len(thirds) > 0 and thirds.max() < LEAST_THIRD * ramp
+    return bool(np.isfinite(y).all()) and len(thirds) > 0 and thirds.max() < least
 
 
 def _doubles(values, k):

@@ -153,13 +153,13 @@ void bind_edges(nb::module_& m) {
         .def(
             "__init__",
             [](Parameters* self, double eps, double eps_factor, int directions, bool interpolate, bool endpoint, bool normals,
-               double max_shift, int max_gap, int max_smear, bool spaced, double merge_significance, double min_significance,
+               double max_shift, int max_gap, int max_smear, bool shadows, bool spaced, double merge_significance, double min_significance,
                int threads) {
                 new (self) Parameters{eps,       eps_factor, directions,         interpolate,      endpoint, normals,
-                                      max_shift, max_gap, max_smear, spaced, merge_significance, min_significance, threads};
+                                      max_shift, max_gap, max_smear, shadows, spaced, merge_significance, min_significance, threads};
             },
             nb::kw_only(), "eps"_a, "eps_factor"_a, "directions"_a, "interpolate"_a, "endpoint"_a, "normals"_a, "max_shift"_a,
-            "max_gap"_a, "max_smear"_a, "spaced"_a, "merge_significance"_a, "min_significance"_a, "threads"_a);
+            "max_gap"_a, "max_smear"_a, "shadows"_a, "spaced"_a, "merge_significance"_a, "min_significance"_a, "threads"_a);
     m.def(
         "long_components",
         [](In<std::uint8_t> edges, int min_length, Out<std::uint8_t> kept) {

@@ -10,6 +10,7 @@
 #include "line.hpp"
 #include "neighbours.hpp"
 #include "parallel.hpp"
+#include "shadow.hpp"
 #include "smear.hpp"
 
 namespace rangeedge {
@@ -17,7 +18,7 @@ namespace {
 
 constexpr double lone_significance = 3;  // of a candidate by itself, before its neighbours are asked
 constexpr double jump_alone = 12;        // significance of a jump
-constexpr double least_third = 0.5;      // third differences of a jump, as a share of those of an even ramp
+constexpr int least_outlined = 3;        // samples of a surface beside a wide gap
 constexpr double jump_tolerances = 2;    // what tells a jump from the approximation's own error
 
 // Where an edge is: between two samples, at an abscissa, also counted in samples.
@@ -29,6 +30,14 @@ struct Cut {
     int steps;     // from sample to sample, between the two curves
 };
 
+// Candidates of some lines, and the pixels over which steps are smeared there.
+struct Found {
+    std::vector<Candidate> candidates;
+    std::vector<std::int32_t> smeared;
+
+    void clear() { candidates.clear(), smeared.clear(); }
+};
+
 template <class T>
 class LineDetector {
 public:
@@ -37,18 +46,18 @@ public:
 
     void read(int first, int count, Strip<T>& strip) const { reader_.read(direction_, first, count, strip); }
 
-    void detect(const Strip<T>& strip, Approximator<T>& approximator, std::vector<Candidate>& candidates) const {
+    void detect(const Strip<T>& strip, Approximator<T>& approximator, Found& found) const {
         approximator.approximate(strip);  // P 4.1
-        for (std::size_t i = 0; i < strip.lines.size(); ++i) detect(strip.lines[i], approximator.line(i), candidates);
+        for (std::size_t i = 0; i < strip.lines.size(); ++i) detect(strip.lines[i], approximator.line(i), found);
     }
 
 private:
-    void detect(const Line<T>& line, const Approximation& a, std::vector<Candidate>& candidates) const {
+    void detect(const Line<T>& line, const Approximation& a, Found& found) const {
         for (std::size_t i = 0; i + 1 < a.count;) {
             Candidate candidate{};
-            std::size_t next = smeared_step(line, a, i, candidate);
+            std::size_t next = smeared_step(line, a, i, candidate, found.smeared);
             if (next == i) candidate = step_or_crease(line, a, i), next = i + 1;
-            if (candidate.jump > 0 || candidate.crease > 0) candidates.push_back(candidate);
+            if (candidate.jump > 0 || candidate.crease > 0) found.candidates.push_back(candidate);
             i = next;
         }
     }
@@ -56,23 +65,27 @@ private:
     Candidate step_or_crease(const Line<T>& line, const Approximation& a, std::size_t i) const {
         const Segment &left = a.segments[i], &right = a.segments[i + 1];
         const int gap = right.first - left.last - 1;
-        if (gap > parameters_.max_gap) return {};
+        if (gap > parameters_.max_gap) return outline(line, a.curves[i], a.curves[i + 1], left, right);
         // A single sample tells nothing of what is beyond the gap beside it.
         if (gap > 0 && std::min(left.size(), right.size()) < 2) return {};
         const Cut cut = adapted_position(line, a, i);              // P 4.2, Fig. 5
         return measure(line, a.curves[i], a.curves[i + 1], cut);   // P 4.2, Fig. 4
     }
 
-    // The one jump of a step that is smeared over a few samples after segment i. Returns the segment on its other side,
-    // or i where there is none.
-    std::size_t smeared_step(const Line<T>& line, const Approximation& a, std::size_t i, Candidate& candidate) const {
+    // The one jump of a step that is smeared over a few samples after segment i, and the pixels of these. Returns the
+    // segment on its other side, or i where there is none.
+    std::size_t smeared_step(const Line<T>& line, const Approximation& a, std::size_t i, Candidate& candidate,
+                             std::vector<std::int32_t>& smeared) const {
         const Smear smear = smear_after(line, a, i, parameters_);
         if (smear.next == i) return i;
         const double xa = line.abscissa(smear.before), xb = line.abscissa(smear.after);
         const Cut cut{smear.before, smear.after, (xa + xb) / 2, (smear.before + smear.after) / 2.0, 0, false,
                       a.segments[smear.next].first - a.segments[i].last};
         candidate = measure(line, a.curves[i], a.curves[smear.next], cut);
-        return candidate.kind & jump_bit ? smear.next : i;
+        if (!(candidate.kind & jump_bit)) return i;
+        for (int k = smear.before + 1; k < smear.after; ++k)
+            if (line.ordinate(k) == line.ordinate(k)) smeared.push_back(static_cast<std::int32_t>(line.path.pixel(k, cols_)));
+        return smear.next;
     }
 
     // The intersection of the two curves nearest the cut becomes the edge position if it is within reach and the
@@ -139,10 +152,7 @@ private:
         else if (jumps)
             crease = crease_significance = 0;
 
-        Candidate c{};
-        c.x = static_cast<float>(line.path.col + cut.sample * line.path.dcol);
-        c.y = static_cast<float>(line.path.row + cut.sample * line.path.drow);
-        c.shift = static_cast<float>(cut.shift);
+        Candidate c = placed(line, cut);
         c.jump = static_cast<float>(std::min(jump, static_cast<double>(std::numeric_limits<float>::max())));
         c.crease = static_cast<float>(crease);
         const double significance = jump > 0 ? std::max(jump_significance, crease_significance) : crease_significance;
@@ -151,11 +161,34 @@ private:
             c.kind = static_cast<std::uint8_t>(jump_bit | (yf > yg ? occluding_bit : occluded_bit));
         else if (crease > 0)
             c.kind = cross > 0 ? convex_bit : concave_bit;  // the tangent turns away from the viewer
+        c.sides[0] = side(line, yf, mf, vf);
+        c.sides[1] = side(line, yg, mg, vg);
+        return c;
+    }
+
+    // The jump at the end of the nearer of two surfaces beside a wide gap.
+    Candidate outline(const Line<T>& line, const Curve& f, const Curve& g, const Segment& left, const Segment& right) const {
+        if (!parameters_.shadows || std::min(left.size(), right.size()) < least_outlined) return {};
+        const ShadowStep step = step_across_shadow(line, f, g, left.last, right.first, parameters_.spaced);
+        const double error = jump_tolerances * std::max(line.tolerance_at(left.last), line.tolerance_at(right.first));
+        if (!(step.significance > jump_alone) || !(step.difference > error)) return {};
+        // Half a sample beyond it.
+        const double sample = step.before_nearer ? left.last + 0.5 : right.first - 0.5;
+        Candidate c = placed(line, {left.last, right.first, 0, sample, 0, false, 0});
+        c.jump = static_cast<float>(std::min(step.jump, static_cast<double>(std::numeric_limits<float>::max())));
+        c.significance = std::min(static_cast<float>(step.significance), endless);
+        c.kind = static_cast<std::uint8_t>(jump_bit | (step.before_nearer ? occluding_bit : occluded_bit));
+        return c;
+    }
+
+    Candidate placed(const Line<T>& line, const Cut& cut) const {
+        Candidate c{};
+        c.x = static_cast<float>(line.path.col + cut.sample * line.path.dcol);
+        c.y = static_cast<float>(line.path.row + cut.sample * line.path.drow);
+        c.shift = static_cast<float>(cut.shift);
         c.direction = static_cast<std::uint8_t>(direction_);
         c.before = static_cast<std::int32_t>(line.path.pixel(cut.before, cols_));
         c.after = static_cast<std::int32_t>(line.path.pixel(cut.after, cols_));
-        c.sides[0] = side(line, yf, mf, vf);
-        c.sides[1] = side(line, yg, mg, vg);
         const double w = line.start + line.step * cut.abscissa;
         for (int i = 0; i < 2; ++i) c.along[i] = static_cast<float>(line.along[i]);
         c.place[0] = static_cast<float>(w * line.along[0] - line.across * line.along[1]);
@@ -164,7 +197,7 @@ private:
     }
 
     // Whether the samples across the cut run on too smoothly for a step of that size, which curves that do not quite
-    // follow them pretend: a ramp over n samples has third differences of step / n, and a sharper one larger ones.
+    // follow them pretend. A sharp step has third differences of twice its size, an even ramp over n samples of step / 2n.
     static bool smooth_across(const Line<T>& line, const Cut& cut, double step) {
         const int first = std::max(cut.before - 2, 0), last = std::min(cut.after + 2, line.path.size - 1);
         double most = 0;
@@ -173,7 +206,7 @@ private:
             if (!(std::abs(third) <= HUGE_VAL)) return false;  // no data
             most = std::max(most, std::abs(third));
         }
-        return last - first >= 3 && most < least_third * step / cut.steps;
+        return last - first >= 3 && most < step / (2.5 * cut.steps - 1.5);
     }
 
     // Between the depths at the samples beside the cut, and what either curve adds to them on the way to it: no more
@@ -204,7 +237,7 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
     // Neighbouring lines of one direction. Any thread may take any part: they are many, and what they cost differs.
     struct Part {
         int direction, first, count;
-        std::vector<Candidate> found;
+        Found found;
     };
     std::vector<Part> parts;
     for (const int direction : {rows_bit, cols_bit, diag45_bit, diag135_bit}) {
@@ -218,24 +251,28 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
     team.run([&](int) {
         Strip<T> strip;
         Approximator<T> approximator(parameters);
-        std::vector<Candidate> found;
+        Found found;
         for (std::size_t i; (i = taken++) < parts.size();) {
             Part& part = parts[i];
             const LineDetector<T> detector(image, noise, parameters, part.direction);
             detector.read(part.first, part.count, strip);
             found.clear();
             detector.detect(strip, approximator, found);
-            part.found.assign(found.begin(), found.end());
+            part.found = found;
         }
     });
+    SmearMask mask(image.rows, image.cols);
+    for (const Part& part : parts) mask.add(part.found.smeared);
     std::int32_t order = 0;
-    for (Part& part : parts)
-        for (Candidate& c : part.found) c.order = order++;
+    for (Part& part : parts) {
+        mask.clear_of_candidates(part.found.candidates);
+        for (Candidate& c : part.found.candidates) c.order = order++;
+    }
     std::vector<Candidate> candidates(static_cast<std::size_t>(order));
     Cells cells(image.rows, image.cols);
-    for (const Part& part : parts) cells.count(part.found);
+    for (const Part& part : parts) cells.count(part.found.candidates);
     for (const Part& part : parts)
-        cells.place(part.found, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
+        cells.place(part.found.candidates, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
     parts.clear();
     pool(candidates, image, parameters, team);
     return candidates;

@@ -28,6 +28,7 @@ struct Parameters {
     double max_shift;           // between the cut and the position of the edge
     int max_gap;                // between the ends of two runs that are compared
     int max_smear;              // samples of a smeared step
+    bool shadows;               // whether the two sides of a wider gap are compared for outlines
     bool spaced;                // whether the spacing of pixels is known as a length
     double merge_significance;  // below it a cut is taken back
     double min_significance;    // below it a candidate is dropped

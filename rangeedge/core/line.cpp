@@ -62,6 +62,23 @@ Path line_path(int direction, int i, int rows, int cols) {
 }
 
 template <class T>
+double grazing_angle(const Line<T>& line, int i, int k) {
+    struct Point {
+        double s, r;
+    };
+    const auto point = [&](int j) {
+        const double w = line.start + line.step * line.abscissa(j), z = line.depth(line.ordinate(j));
+        return line.projective ? Point{w * z, line.kappa * z} : Point{w, z};
+    };
+    const Point a = point(i), b = point(k), ray = line.projective ? Point{a.s + b.s, a.r + b.r} : Point{0, 1};
+    const Point way{b.s - a.s, b.r - a.r};
+    return degrees_of(way.s * ray.r - way.r * ray.s, std::abs(way.s * ray.s + way.r * ray.r));
+}
+
+template double grazing_angle(const Line<float>&, int, int);
+template double grazing_angle(const Line<double>&, int, int);
+
+template <class T>
 void LineReader<T>::read(int direction, int first, int count, Strip<T>& strip) const {
     strip.lines.resize(static_cast<std::size_t>(count));
     int longest = 0;

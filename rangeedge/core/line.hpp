@@ -74,6 +74,12 @@ struct Line {
     }
 };
 
+// The angle at which the viewing ray meets the straight line from sample i to sample k, in degrees, and up to which one
+// a surface between them would hardly be seen.
+template <class T>
+double grazing_angle(const Line<T>& line, int i, int k);
+constexpr double veil = 20;
+
 constexpr int strip_lines = 32;  // at most, in a strip: samples of two cache lines
 
 // Neighbouring lines of one direction, and their samples where those do not lie in the image one after the other;

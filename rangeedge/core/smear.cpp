@@ -7,26 +7,11 @@
 namespace rangeedge {
 namespace {
 
+constexpr int ends = 4;             // samples, so many more may belong to short segments than are smeared
 constexpr int always_smeared = 2;   // samples, too few to show a surface
-constexpr double overshoot = 0.1;   // how far beyond a side a smeared depth may lie, as a share of the step
+constexpr double overshoot = 0.2;   // how far beyond a side a smeared depth may lie, as a share of the step
 constexpr double own_share = 0.15;  // of the step, up to which a sample belongs to a side
 constexpr double least_ramp = 0.5;  // share of an even ramp that the samples must climb
-constexpr double veil = 20;         // degrees from the viewing ray, up to which a ramp is no surface
-
-// The angle at which the viewing ray meets the straight line from sample i to sample k, in degrees.
-template <class T>
-double grazing_angle(const Line<T>& line, int i, int k) {
-    struct Point {
-        double s, r;
-    };
-    const auto point = [&](int j) {
-        const double w = line.start + line.step * line.abscissa(j), z = line.depth(line.ordinate(j));
-        return line.projective ? Point{w * z, line.kappa * z} : Point{w, z};
-    };
-    const Point a = point(i), b = point(k);
-    const Point way{b.s - a.s, b.r - a.r}, ray = line.projective ? Point{a.s + b.s, a.r + b.r} : Point{0, 1};
-    return degrees_of(way.s * ray.r - way.r * ray.s, std::abs(way.s * ray.s + way.r * ray.r));
-}
 
 }  // namespace
 
@@ -38,7 +23,7 @@ Smear smear_after(const Line<T>& line, const Approximation& a, std::size_t i, co
     int count = 0;
     for (; next < a.count && a.segments[next].size() <= parameters.max_smear; ++next) {
         count += a.segments[next].size();
-        if (count > parameters.max_smear) return none;
+        if (count > parameters.max_smear + ends) return none;
     }
     if (next == i + 1 || next == a.count) return none;
     for (std::size_t j = i; j < next; ++j)
@@ -64,9 +49,38 @@ Smear smear_after(const Line<T>& line, const Approximation& a, std::size_t i, co
             else smear.after = std::min(smear.after, k);
         }
     if (last - first < least_ramp * (count - 1) / (count + 1)) return none;
-    const int smeared = smear.after - smear.before - 1;
+    int smeared = 0;
+    for (int k = smear.before + 1; k < smear.after; ++k) smeared += line.ordinate(k) == line.ordinate(k);
+    if (smeared > parameters.max_smear) return none;
     if (parameters.spaced && smeared > always_smeared && grazing_angle(line, smear.before, smear.after) > veil) return none;
     return smear;
+}
+
+void SmearMask::add(const std::vector<std::int32_t>& pixels) {
+    if (pixels.empty()) return;
+    mask_.resize(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(cols_));
+    for (const std::int32_t p : pixels) {
+        const int row = p / cols_, col = p % cols_;
+        for (int v = std::max(0, row - 1); v <= std::min(rows_ - 1, row + 1); ++v)
+            for (int u = std::max(0, col - 1); u <= std::min(cols_ - 1, col + 1); ++u) {
+                std::uint8_t& m = mask_[static_cast<std::size_t>(v) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(u)];
+                m = std::max<std::uint8_t>(m, v == row && u == col ? within : beside);
+            }
+    }
+}
+
+void SmearMask::clear_of_candidates(std::vector<Candidate>& candidates) const {
+    if (mask_.empty()) return;
+    const auto smeared = [&](const Candidate& c) {
+        const int before = mask_[static_cast<std::size_t>(c.before)], after = mask_[static_cast<std::size_t>(c.after)];
+        if (c.kind & jump_bit) return (c.kind & occluding_bit ? before : after) == within;
+        return std::max(before, after) >= beside;
+    };
+    candidates.erase(std::remove_if(candidates.begin(), candidates.end(), smeared), candidates.end());
+}
+
+void SmearMask::write(std::uint8_t* smeared) const {
+    for (std::size_t i = 0; i < mask_.size(); ++i) smeared[i] = mask_[i] == within ? 255 : 0;
 }
 
 template Smear smear_after(const Line<float>&, const Approximation&, std::size_t, const Parameters&);

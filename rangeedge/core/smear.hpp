@@ -3,6 +3,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstddef>
+#include <cstdint>
+#include <vector>
 
 #include "approximation.hpp"
 #include "edges.hpp"
@@ -22,5 +24,23 @@ struct Smear {
 // viewing direction.
 template <class T>
 Smear smear_after(const Line<T>& line, const Approximation& a, std::size_t i, const Parameters& parameters);
+
+// The pixels of an image over which steps are smeared. Lines that cross such a step at a flat angle see a ramp of many
+// samples there, with creases at its ends.
+class SmearMask {
+public:
+    SmearMask(int rows, int cols) : rows_(rows), cols_(cols) {}
+
+    void add(const std::vector<std::int32_t>& pixels);
+    // Removes jumps whose nearer side is smeared, and creases of which a pixel is smeared or beside one that is.
+    void clear_of_candidates(std::vector<Candidate>& candidates) const;
+    // 255 where a pixel is smeared; the output holds zeros before.
+    void write(std::uint8_t* smeared) const;
+
+private:
+    enum : std::uint8_t { beside = 1, within = 2 };
+    int rows_, cols_;
+    std::vector<std::uint8_t> mask_;  // empty without smeared pixels
+};
 
 }  // namespace rangeedge
