@@ -51,6 +51,7 @@ from .distance import (
 )
 from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
 from .edges import EdgeStrength, ScanLineParams, edgePoints, edgeStrength, splitScanLine
+from .flying import flyingPixels
 from .io import RangeImage, imreadRange, imwriteRange
 from .noise import NoiseModel, estimateNoise
 from .regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
@@ -79,6 +80,7 @@ __all__ = [  # noqa: RUF022
     "EdgeStrength",
     "edgeStrength",
     "edgePoints",
+    "flyingPixels",
     "strengthImage",
     "overallStrength",
     "selectEdges",

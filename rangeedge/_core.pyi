@@ -61,6 +61,16 @@ def edge_strength(
     kind: NDArray[np.uint8],
     significance: NDArray[np.float32],
 ) -> None: ...
+def flying_pixels(
+    src: NDArray[_Real],
+    projective: bool,
+    to_plane: Sequence[float],
+    axis: Sequence[float],
+    noise: Sequence[float],
+    noise_map: NDArray[np.float32] | None,
+    parameters: Parameters,
+    flying: NDArray[np.uint8],
+) -> None: ...
 def long_components(edges: NDArray[np.uint8], min_length: int, kept: NDArray[np.uint8]) -> None: ...
 def distance_transform(
     edges: NDArray[np.uint8], distance: NDArray[np.float32], labels: NDArray[np.int32] | None, threads: int

@@ -203,6 +203,7 @@ def _add_detector(parser: argparse.ArgumentParser) -> None:
         ),
         ("minLength", int, "shorter edges are removed, in pixels (default: %(was)s)"),
         ("dynamic", bool, "remove chains that do not stand out of the population (Venkatesh and Rosin)"),
+        ("boundaryEdges", bool, "every border with pixels without data is an edge"),
     ):
         _add_option(group, name, kind, text.replace("%(was)s", str(defaults[name])))
     group = parser.add_argument_group("how edges are found (the fields of ScanLineParams)")
@@ -238,6 +239,9 @@ def _add_field(group: Any, name: str) -> None:
         )
     else:
         kind = {"bool": bool, "int": int}.get(str(field.type), float)
+        if field.default is True:
+            group.add_argument(f"--{_kebab(name)}", action=argparse.BooleanOptionalAction, dest=name, help=text)
+            return
         default = "" if kind is bool or field.default is None else f" (default: {field.default:g})"
         _add_option(group, name, kind, text + default)
 

@@ -25,7 +25,7 @@ from ._args import (
     number,
     pixel_size,
 )
-from ._constants import EDGE_OCCLUDING
+from ._constants import EDGE_BOUNDARY, EDGE_OCCLUDING
 from ._files import write_atomically
 from .edges import (
     EdgeStrength,
@@ -68,6 +68,7 @@ def detectEdges(
     hysteresis: float = _DEFAULT.hysteresis,
     minLength: int = _DEFAULT.minLength,
     dynamic: bool = False,
+    boundaryEdges: bool = False,
     **options: Any,
 ) -> np.ndarray:
     """Find the edges of a range image as a map of lines one pixel wide.
@@ -104,6 +105,9 @@ def detectEdges(
         Least length of a connected line in pixels, >= 1.
     dynamic : bool
         Whether to remove lines that do not stand out of the noise, by the statistics of all of them.
+    boundaryEdges : bool
+        Whether every border with pixels without data is an edge. Outlines beside shadow are edges without it, where
+        another surface is seen beyond; see `shadowEdges` of `ScanLineParams`.
     K, pixelSize, heightMap, depthFactor, noise, directions, fit, measure, crease, maxShift, maxGap, ...
         As in `ScanLineParams`, which holds the defaults.
 
@@ -137,7 +141,7 @@ def detectEdges(
     """
     func = "detectEdges"
     params = params_of(func, eps, options)
-    selection = Selection(jumpThreshold, creaseThreshold, hysteresis, minLength, dynamic).checked(func)
+    selection = Selection(jumpThreshold, creaseThreshold, hysteresis, minLength, dynamic, boundaryEdges).checked(func)
     found = found_edges(func, frame_of(func, src, params, mask), params, selection)
     return deliver(func, "edges", found.thin, edges)
 
@@ -150,10 +154,13 @@ def found_edges(func: str, frame: RangeFrame, params: ScanLineParams, selection:
 
 
 def selected_of(strength: EdgeStrength, selection: Selection) -> np.ndarray:
-    """The edge map before thinning: jumps on their nearer side, and creases that do not stand alone."""
+    """The edge map before thinning: jumps on their nearer side, creases that do not stand alone, borders if asked for."""
     jump = cv2.copyTo(strength.jump, strength.kind & np.uint8(EDGE_OCCLUDING))
     crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold)
-    return selected(jump, crease, selection)
+    edges = selected(jump, crease, selection)
+    if selection.boundaryEdges:
+        edges[strength.kind & EDGE_BOUNDARY > 0] = 255
+    return edges
 
 
 def _unfrayed(crease: np.ndarray, least: float) -> np.ndarray:
@@ -297,13 +304,16 @@ class ScanLineDetector:
         hysteresis: float = _DEFAULT.hysteresis,
         minLength: int = _DEFAULT.minLength,
         dynamic: bool = False,
+        boundaryEdges: bool = False,
     ) -> np.ndarray:
         """Find the edges as a map of lines one pixel wide, as the function `detectEdges` does.
 
         detectEdges(src[, jumpThreshold[, creaseThreshold[, edges]]], *[, mask[, hysteresis[, ...]]]) -> edges
         """
         params, func = self._params, "ScanLineDetector.detectEdges"
-        selection = Selection(jumpThreshold, creaseThreshold, hysteresis, minLength, dynamic).checked(func)
+        selection = Selection(jumpThreshold, creaseThreshold, hysteresis, minLength, dynamic, boundaryEdges).checked(
+            func
+        )
         found = found_edges(func, frame_of(func, src, params, mask), params, selection)
         return deliver(func, "edges", found.thin, edges)
 
@@ -470,9 +480,10 @@ def _write_node(fs: cv2.FileStorage, name: str, value: Any) -> None:
 
 def _params_in(func: str, node: cv2.FileNode) -> ScanLineParams:
     options = {name: _node_value(func, node.getNode(name)) for name in node.keys()}  # noqa: SIM118
-    heightMap = options.get("heightMap")
-    if isinstance(heightMap, int) and heightMap in (0, 1):  # a file storage knows no bool
-        options["heightMap"] = bool(heightMap)
+    for field in fields(ScanLineParams):
+        value = options.get(field.name)
+        if isinstance(field.default, bool) and isinstance(value, int) and value in (0, 1):
+            options[field.name] = bool(value)  # a file storage knows no bool
     if isinstance(options.get("noise"), dict):
         try:
             options["noise"] = NoiseModel(**options["noise"])

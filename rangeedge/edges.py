@@ -69,8 +69,8 @@ class ScanLineParams:
         to be one jump between the surfaces on either side. More than two are a surface of their own unless it is
         almost parallel to the viewing direction. 0 takes every pixel for a surface.
     shadowEdges : bool
-        Whether a surface that ends at a gap wider than `maxGap`, in front of another one beyond it, has a jump at its end:
-        the outline of an object beside its shadow. A surface with a hole in it has none.
+        Whether a surface that ends at a gap wider than `maxGap`, in front of another one beyond it, has a jump at its
+        end: the outline of an object beside its shadow. A surface with a hole in it has none.
     mergeSignificance : float
         Cuts are taken back where that raises the sum of squared residuals by less than its square, in variances of the
         noise; a segment across an edge, or its rounding, is given to the surfaces beside it likewise. 0 keeps all.
@@ -195,8 +195,8 @@ def splitScanLine(z: np.ndarray, eps: float, pixelSize: float | np.ndarray = 1.0
     |z - f(x)| exceeds `eps` the run is cut, and both parts are treated the same way. The cut falls between two
     samples: the extreme one joins the neighbour whose value is closer. No side is preferred, so that a reversed line is
     cut at the same places: of two samples in the middle, the one closer to the straight line between the ends is the
-    midpoint, and where they are equally far on either side of it that line is the curve; of equally extreme samples the one closer to the middle counts, or both; of equally close neighbours the
-    one farther from the middle is joined.
+    midpoint, and where they are equally far on either side of it that line is the curve; of equally extreme samples the
+    one closer to the middle counts, or both; of equally close neighbours the one farther from the middle is joined.
 
     Parameters
     ----------
@@ -372,7 +372,7 @@ def strength_of(func: str, frame: RangeFrame, params: ScanLineParams) -> EdgeStr
     """Edge strengths of a checked range image."""
     strength = _no_strength(frame.shape)
     noise = kernel_noise(func, params.noise, frame)
-    _core.edge_strength(*frame.kernel_args, *noise, _kernel_parameters(params, frame), *strength)
+    _core.edge_strength(*frame.kernel_args, *noise, kernel_parameters(params, frame), *strength)
     return strength
 
 
@@ -391,14 +391,15 @@ _POINT += [("kind", "u1"), ("significance", "f4"), ("direction", "u1")]
 def points_of(func: str, frame: RangeFrame, params: ScanLineParams) -> np.ndarray:
     """Edge points of a checked range image."""
     noise = kernel_noise(func, params.noise, frame)
-    candidates = _core.edge_candidates(*frame.kernel_args, *noise, _kernel_parameters(params, frame))
+    candidates = _core.edge_candidates(*frame.kernel_args, *noise, kernel_parameters(params, frame))
     points = np.empty(len(candidates["x"]), dtype=_POINT)
     for name in points.dtype.names:
         points[name] = candidates[name]
     return points
 
 
-def _kernel_parameters(params: ScanLineParams, frame: RangeFrame) -> _core.Parameters:
+def kernel_parameters(params: ScanLineParams, frame: RangeFrame) -> _core.Parameters:
+    """Checked parameters in the form that kernels take."""
     return _core.Parameters(
         eps=params.eps or 0.0,
         eps_factor=params.epsFactor,

@@ -201,6 +201,7 @@ class Selection(NamedTuple):
     hysteresis: float = 1.0
     minLength: int = 5
     dynamic: bool = False
+    boundaryEdges: bool = False
 
     def checked(self, func: str) -> Selection:
         """The same with every value of its own type; an error names `func`."""
@@ -210,6 +211,7 @@ class Selection(NamedTuple):
             _args.number(func, "hysteresis", self.hysteresis, 0, 1, above=True),
             _args.integer(func, "minLength", self.minLength, 1),
             _args.boolean(func, "dynamic", self.dynamic),
+            _args.boolean(func, "boundaryEdges", self.boundaryEdges),
         )
 
 

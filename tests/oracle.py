@@ -7,6 +7,7 @@ carried over from one step to the next. Only splitting is done in the precision 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -409,7 +410,7 @@ class Image:
 class Detector:
     def __init__(self, image: Image):
         self.image, self.p = image, image.params
-        self.smeared = set()  # pixels over which a step is smeared
+        self.smeared = Counter()  # how often a pixel is found to be one over which a step is smeared
 
     def candidates(self):
         found = []
@@ -417,14 +418,9 @@ class Detector:
             if self.p.directions & direction:
                 for pixels in paths(direction, *self.image.shape):
                     found += self._of_line(self.image.line(pixels, direction))
-        return Neighbourhood([c for c in found if not self._in_smear(c)], self.image).pooled()
-
-    def _in_smear(self, c):
-        """A jump whose nearer side is smeared, or a crease of which a pixel is smeared or beside one that is."""
-        if c.kind & EDGE_JUMP:
-            return c.pixels[0 if c.kind & EDGE_OCCLUDING else 1] in self.smeared
-        beside = {(u + i, v + j) for u, v in c.pixels for i in (-1, 0, 1) for j in (-1, 0, 1)}
-        return not beside.isdisjoint(self.smeared)
+        least = bin(self.p.directions).count("1")
+        smeared = {p for p in self.smeared if sum(self.smeared[q] for q in _around([p])) >= least}
+        return Neighbourhood([c for c in found if not _in_smear(c, smeared)], self.image).pooled()
 
     def segments(self, line):
         eps = line.y.dtype.type(1 if line.scale is not None else np.nanmax(line.tolerance, initial=0))
@@ -454,7 +450,8 @@ class Detector:
     def _at_cut(self, line, left, right):
         gap = right.first - left.last - 1
         if gap > self.p.maxGap:
-            return self._outline(line, left, right) if self.p.shadowEdges else None
+            long = min(left.size, right.size) >= LEAST_OUTLINED
+            return self._outline(line, left, right, left.last, right.first) if long else None
         if gap and min(left.size, right.size) == 1:
             return None
         return self._measured(line, left, right, *self._position(line, left, right))
@@ -467,7 +464,7 @@ class Detector:
         left, short, right = segments[i], segments[i + 1 : long[1]], segments[long[1]]
         samples = [k for s in short for k in range(s.first, s.last + 1)]
         gaps = [b.first - a.last - 1 for a, b in pairwise(segments[i : long[1] + 1])]
-        if len(samples) > self.p.maxSmear + SMEAR_ENDS or max(gaps) > self.p.maxGap:
+        if len(samples) > self.p.maxSmear + SMEAR_ENDS:
             return None
         x = _doubles(line.x, samples)
         before, after = ([s.curve.value(t) for t in x] for s in (left, right))
@@ -494,10 +491,13 @@ class Detector:
         if self.image.spaced and len(smeared) > ALWAYS_SMEARED and line.grazing_angle(a, b) > VEIL:
             return None
         middle = (float(line.x[a]) + float(line.x[b])) / 2
-        candidate = self._measured(line, left, right, a, b, middle, (a + b) / 2, False)
-        if not candidate.kind & EDGE_JUMP:
+        if max(gaps) > self.p.maxGap:
+            candidate = self._outline(line, left, right, a, b)
+        else:
+            candidate = self._measured(line, left, right, a, b, middle, (a + b) / 2, False)
+        if not candidate or not candidate.kind & EDGE_JUMP:
             return None
-        self.smeared |= {line.pixels[k] for k in smeared}
+        self.smeared.update(line.pixels[k] for k in smeared)
         return candidate, long[1]
 
     def _fit(self, line, s):
@@ -561,14 +561,13 @@ class Detector:
         cost = rise / sigma**2
         return (cost, pair) if cost < (STRADDLING * self.p.mergeSignificance) ** 2 else stays
 
-    def _outline(self, line, left, right):
-        """The jump at the end of the nearer of two surfaces beside a wide gap, or None."""
-        if min(left.size, right.size) < LEAST_OUTLINED:
+    def _outline(self, line, left, right, a, b):
+        """The jump at the end of the nearer of two surfaces, beside a wide gap between samples a and b; or None."""
+        if not self.p.shadowEdges:
             return None
-        ends = [(float(line.x[s.last if s is left else s.first]), s.curve) for s in (left, right)]
+        ends = [(float(line.x[a]), left.curve), (float(line.x[b]), right.curve)]
         (x, near), (x_far, far) = sorted(ends, key=lambda end: end[1].value(end[0]), reverse=True)
         y, y_far, below = near.value(x), far.value(x_far), far.value(x)
-        a, b = left.last, right.first
         if line.projective and not min(y, y_far, below) > 0:
             return None
         if self.image.spaced and line.grazing_angle(a, b) > VEIL:
@@ -691,6 +690,17 @@ def _smooth(y, least):
     """Whether samples have third differences, which all are smaller than that."""
     thirds = np.abs(np.diff(y.astype(np.float64), 3))
     return bool(np.isfinite(y).all()) and len(thirds) > 0 and thirds.max() < least
+
+
+def _in_smear(c, smeared):
+    """A jump whose nearer side is smeared, or a crease of which a pixel is smeared or beside one that is."""
+    if c.kind & EDGE_JUMP:
+        return c.pixels[0 if c.kind & EDGE_OCCLUDING else 1] in smeared
+    return not _around(c.pixels).isdisjoint(smeared)
+
+
+def _around(pixels):
+    return {(u + i, v + j) for u, v in pixels for i in (-1, 0, 1) for j in (-1, 0, 1)}
 
 
 def _doubles(values, k):

@@ -22,7 +22,7 @@ from rangeedge import _core
 
 PUBLIC = """
     error RangeImage imreadRange imwriteRange NoiseModel estimateNoise ScanLineParams splitScanLine
-    EdgeStrength edgeStrength edgePoints strengthImage overallStrength selectEdges thinEdges detectEdges
+    EdgeStrength edgeStrength edgePoints flyingPixels strengthImage overallStrength selectEdges thinEdges detectEdges
     ScanLineDetector createScanLineDetector closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
     extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats

@@ -32,8 +32,9 @@ def barred(z, segments):
 
 
 # Worked out by hand. In each line: the whole run is approximated by the quadratic through its two ends and its
-# midpoint (of two, the one closer to the straight line between the ends, or that line), and cut beside its worst sample (of two, the
-# one closer to the middle, or both), which joins its closer neighbour (of two, the one farther from the middle).
+# midpoint (of two, the one closer to the straight line between the ends, or that line), and cut beside its worst sample
+# (of two, the one closer to the middle, or both), which joins its closer neighbour (of two, the one farther from the
+# middle).
 @pytest.mark.parametrize(
     ("eps", "expected"),
     [

@@ -132,6 +132,15 @@ void define(nb::module_& m) {
         },
         "src"_a.noconvert(), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a, "noise_map"_a.noconvert().none(), "parameters"_a);
     m.def(
+        "flying_pixels",
+        [](In<T> src, bool projective, std::array<double, 6> to_plane, std::array<double, 3> axis, NoiseArgs noise,
+           std::optional<In<float>> noise_map, const Parameters& parameters, Out<std::uint8_t> flying) {
+            nb::gil_scoped_release release;
+            detect(range_image(src, projective, to_plane, axis), noise_model(noise, noise_map), parameters, flying.data());
+        },
+        "src"_a.noconvert(), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a, "noise_map"_a.noconvert().none(), "parameters"_a,
+        "flying"_a.noconvert());
+    m.def(
         "edge_strength",
         [](In<T> src, bool projective, std::array<double, 6> to_plane, std::array<double, 3> axis, NoiseArgs noise,
            std::optional<In<float>> noise_map, const Parameters& parameters, Out<float> jump, Out<float> crease,

@@ -65,7 +65,10 @@ private:
     Candidate step_or_crease(const Line<T>& line, const Approximation& a, std::size_t i) const {
         const Segment &left = a.segments[i], &right = a.segments[i + 1];
         const int gap = right.first - left.last - 1;
-        if (gap > parameters_.max_gap) return outline(line, a.curves[i], a.curves[i + 1], left, right);
+        if (gap > parameters_.max_gap)
+            return std::min(left.size(), right.size()) < least_outlined
+                       ? Candidate{}
+                       : outline(line, a.curves[i], a.curves[i + 1], left.last, right.first);
         // A single sample tells nothing of what is beyond the gap beside it.
         if (gap > 0 && std::min(left.size(), right.size()) < 2) return {};
         const Cut cut = adapted_position(line, a, i);              // P 4.2, Fig. 5
@@ -81,7 +84,8 @@ private:
         const double xa = line.abscissa(smear.before), xb = line.abscissa(smear.after);
         const Cut cut{smear.before, smear.after, (xa + xb) / 2, (smear.before + smear.after) / 2.0, 0, false,
                       a.segments[smear.next].first - a.segments[i].last};
-        candidate = measure(line, a.curves[i], a.curves[smear.next], cut);
+        const Curve &f = a.curves[i], &g = a.curves[smear.next];
+        candidate = smear.gap > parameters_.max_gap ? outline(line, f, g, smear.before, smear.after) : measure(line, f, g, cut);
         if (!(candidate.kind & jump_bit)) return i;
         for (int k = smear.before + 1; k < smear.after; ++k)
             if (line.ordinate(k) == line.ordinate(k)) smeared.push_back(static_cast<std::int32_t>(line.path.pixel(k, cols_)));
@@ -167,14 +171,14 @@ private:
     }
 
     // The jump at the end of the nearer of two surfaces beside a wide gap.
-    Candidate outline(const Line<T>& line, const Curve& f, const Curve& g, const Segment& left, const Segment& right) const {
-        if (!parameters_.shadows || std::min(left.size(), right.size()) < least_outlined) return {};
-        const ShadowStep step = step_across_shadow(line, f, g, left.last, right.first, parameters_.spaced);
-        const double error = jump_tolerances * std::max(line.tolerance_at(left.last), line.tolerance_at(right.first));
+    Candidate outline(const Line<T>& line, const Curve& f, const Curve& g, int before, int after) const {
+        if (!parameters_.shadows) return {};
+        const ShadowStep step = step_across_shadow(line, f, g, before, after, parameters_.spaced);
+        const double error = jump_tolerances * std::max(line.tolerance_at(before), line.tolerance_at(after));
         if (!(step.significance > jump_alone) || !(step.difference > error)) return {};
         // Half a sample beyond it.
-        const double sample = step.before_nearer ? left.last + 0.5 : right.first - 0.5;
-        Candidate c = placed(line, {left.last, right.first, 0, sample, 0, false, 0});
+        const double sample = step.before_nearer ? before + 0.5 : after - 0.5;
+        Candidate c = placed(line, {before, after, 0, sample, 0, false, 0});
         c.jump = static_cast<float>(std::min(step.jump, static_cast<double>(std::numeric_limits<float>::max())));
         c.significance = std::min(static_cast<float>(step.significance), endless);
         c.kind = static_cast<std::uint8_t>(jump_bit | (step.before_nearer ? occluding_bit : occluded_bit));
@@ -233,7 +237,8 @@ private:
 }  // namespace
 
 template <class T>
-std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters) {
+std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters,
+                              std::uint8_t* smeared) {
     // Neighbouring lines of one direction. Any thread may take any part: they are many, and what they cost differs.
     struct Part {
         int direction, first, count;
@@ -261,8 +266,12 @@ std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, co
             part.found = found;
         }
     });
-    SmearMask mask(image.rows, image.cols);
-    for (const Part& part : parts) mask.add(part.found.smeared);
+    std::vector<const std::vector<std::int32_t>*> smeared_pixels;
+    for (const Part& part : parts) smeared_pixels.push_back(&part.found.smeared);
+    int directions = 0;
+    for (const int direction : {rows_bit, cols_bit, diag45_bit, diag135_bit}) directions += (parameters.directions & direction) != 0;
+    const SmearMask mask(image.rows, image.cols, smeared_pixels, directions);
+    if (smeared) mask.write(smeared);
     std::int32_t order = 0;
     for (Part& part : parts) {
         mask.clear_of_candidates(part.found.candidates);
@@ -309,7 +318,7 @@ void combine(const std::vector<Candidate>& candidates, float* jump, float* creas
         }
 }
 
-template std::vector<Candidate> detect(const RangeImage<float>&, const Noise&, const Parameters&);
-template std::vector<Candidate> detect(const RangeImage<double>&, const Noise&, const Parameters&);
+template std::vector<Candidate> detect(const RangeImage<float>&, const Noise&, const Parameters&, std::uint8_t*);
+template std::vector<Candidate> detect(const RangeImage<double>&, const Noise&, const Parameters&, std::uint8_t*);
 
 }  // namespace rangeedge

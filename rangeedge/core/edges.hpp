@@ -76,9 +76,11 @@ struct Candidate {
     float place[2], along[2];    // position and direction of the line in the plane of the image
 };
 
-// All candidates, by their place in the image; the same for any number of threads.
+// All candidates, by their place in the image; the same for any number of threads. `smeared`, unless null, becomes 255
+// at pixels over which a step is smeared; it holds zeros before.
 template <class T>
-std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters);
+std::vector<Candidate> detect(const RangeImage<T>& image, const Noise& noise, const Parameters& parameters,
+                              std::uint8_t* smeared = nullptr);
 
 // Brings them into their order along directions and lines.
 void put_in_order(std::vector<Candidate>& candidates);

@@ -17,7 +17,7 @@ constexpr double least_ramp = 0.5;  // share of an even ramp that the samples mu
 
 template <class T>
 Smear smear_after(const Line<T>& line, const Approximation& a, std::size_t i, const Parameters& parameters) {
-    const Smear none{0, 0, i};
+    const Smear none{0, 0, i, 0};
     if (a.segments[i].size() <= parameters.max_smear) return none;
     std::size_t next = i + 1;
     int count = 0;
@@ -26,11 +26,11 @@ Smear smear_after(const Line<T>& line, const Approximation& a, std::size_t i, co
         if (count > parameters.max_smear + ends) return none;
     }
     if (next == i + 1 || next == a.count) return none;
-    for (std::size_t j = i; j < next; ++j)
-        if (a.segments[j + 1].first - a.segments[j].last - 1 > parameters.max_gap) return none;
 
     const Curve &f = a.curves[i], &g = a.curves[next];
-    Smear smear{a.segments[i].last, a.segments[next].first, next};
+    Smear smear{a.segments[i].last, a.segments[next].first, next, 0};
+    for (std::size_t j = i; j < next; ++j)
+        smear.gap = std::max(smear.gap, a.segments[j + 1].first - a.segments[j].last - 1);
     double side = 0, first = 0, last = 0;
     bool left = true;  // of the ramp
     for (std::size_t j = i + 1; j < next; ++j)
@@ -56,17 +56,27 @@ Smear smear_after(const Line<T>& line, const Approximation& a, std::size_t i, co
     return smear;
 }
 
-void SmearMask::add(const std::vector<std::int32_t>& pixels) {
-    if (pixels.empty()) return;
-    mask_.resize(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(cols_));
-    for (const std::int32_t p : pixels) {
-        const int row = p / cols_, col = p % cols_;
-        for (int v = std::max(0, row - 1); v <= std::min(rows_ - 1, row + 1); ++v)
-            for (int u = std::max(0, col - 1); u <= std::min(cols_ - 1, col + 1); ++u) {
-                std::uint8_t& m = mask_[static_cast<std::size_t>(v) * static_cast<std::size_t>(cols_) + static_cast<std::size_t>(u)];
-                m = std::max<std::uint8_t>(m, v == row && u == col ? within : beside);
-            }
-    }
+SmearMask::SmearMask(int rows, int cols, const std::vector<const std::vector<std::int32_t>*>& found, int least) {
+    const bool none = std::all_of(found.begin(), found.end(), [](const auto* pixels) { return pixels->empty(); });
+    if (none) return;
+    std::vector<std::uint8_t> times(static_cast<std::size_t>(rows) * static_cast<std::size_t>(cols));
+    mask_.resize(times.size());
+    for (const auto* pixels : found)
+        for (const std::int32_t p : *pixels) ++times[static_cast<std::size_t>(p)];
+    const auto for_each_around = [&](std::int32_t p, auto&& visit) {
+        const int row = p / cols, col = p % cols;
+        for (int v = std::max(0, row - 1); v <= std::min(rows - 1, row + 1); ++v)
+            for (int u = std::max(0, col - 1); u <= std::min(cols - 1, col + 1); ++u)
+                visit(static_cast<std::size_t>(v) * static_cast<std::size_t>(cols) + static_cast<std::size_t>(u));
+    };
+    for (const auto* pixels : found)
+        for (const std::int32_t p : *pixels) {
+            int count = 0;
+            for_each_around(p, [&](std::size_t q) { count += times[q]; });
+            if (count < least) continue;
+            for_each_around(p, [&](std::size_t q) { mask_[q] = std::max<std::uint8_t>(mask_[q], beside); });
+            mask_[static_cast<std::size_t>(p)] = within;
+        }
 }
 
 void SmearMask::clear_of_candidates(std::vector<Candidate>& candidates) const {

@@ -12,10 +12,12 @@
 
 namespace rangeedge {
 
-// A smeared step: the last sample of the surface before it, the first one of that after it, and the segment there.
+// A smeared step: the last sample of the surface before it, the first one of that after it, and the segment there; and
+// the most samples without data between two others.
 struct Smear {
     int before, after;
     std::size_t next;
+    int gap;
 };
 
 // The smeared step after segment i of a line; with next = i where there is none. It is a ramp of short segments between
@@ -29,9 +31,10 @@ Smear smear_after(const Line<T>& line, const Approximation& a, std::size_t i, co
 // samples there, with creases at its ends.
 class SmearMask {
 public:
-    SmearMask(int rows, int cols) : rows_(rows), cols_(cols) {}
+    // From the pixels that each line finds. Those count that, together with the eight around them, are found `least`
+    // times: a smeared step goes on from line to line.
+    SmearMask(int rows, int cols, const std::vector<const std::vector<std::int32_t>*>& found, int least);
 
-    void add(const std::vector<std::int32_t>& pixels);
     // Removes jumps whose nearer side is smeared, and creases of which a pixel is smeared or beside one that is.
     void clear_of_candidates(std::vector<Candidate>& candidates) const;
     // 255 where a pixel is smeared; the output holds zeros before.
@@ -39,7 +42,6 @@ public:
 
 private:
     enum : std::uint8_t { beside = 1, within = 2 };
-    int rows_, cols_;
     std::vector<std::uint8_t> mask_;  // empty without smeared pixels
 };
 
