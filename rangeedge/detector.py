@@ -154,7 +154,7 @@ def found_edges(func: str, frame: RangeFrame, params: ScanLineParams, selection:
 
 
 def selected_of(strength: EdgeStrength, selection: Selection) -> np.ndarray:
-    """The edge map before thinning: jumps on their nearer side, creases that do not stand alone, borders if asked for."""
+    """The edge map before thinning: jumps on their nearer side, creases that do not stand alone, borders on request."""
     jump = cv2.copyTo(strength.jump, strength.kind & np.uint8(EDGE_OCCLUDING))
     crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold)
     edges = selected(jump, crease, selection)

@@ -55,7 +55,7 @@ def test_thin_objects_are_none():
 
 
 def test_pixels_beside_shadow_are_found():
-    z, share = smeared(U - 59, 2)
+    z, _ = smeared(U - 59, 2)
     z[:, 60:72] = NAN
     flying = flyingPixels(z, K=K)
     assert flying[15:65, 59].all()  # diagonals leave the image sooner than rows
