@@ -93,19 +93,16 @@ def closeContours(
     share = number(func, "share", share, 0, 1, above=True)
     maxGap = integer(func, "maxGap", maxGap, 0)
     minArea = integer(func, "minArea", minArea, 1)
-    coefficients, noise_map = kernel_noise(func, noise, frame)
-    arguments = surface_map(frame, coefficients, noise_map)
-    arguments["edges"] = edges
-    regions = np.empty(frame.shape, np.int32)
-    _core.verified_regions(
-        **arguments,
-        correlation=coefficients[3],
+    deviations = kernel_noise(func, noise, frame)
+    options = _core.ClosureOptions(
+        correlation=deviations.correlation,
         tolerance=tolerance,
         share=share,
         dilations=(maxGap + 1) // 2,
         min_area=minArea,
-        regions=regions,
     )
+    regions = np.empty(frame.shape, np.int32)
+    _core.verified_regions(surface_map(frame, deviations, edges), options, regions)
     closed = ((edges != 0) | _meetings(regions)).view(np.uint8) * np.uint8(255)
     return deliver(func, "dst", closed, dst)
 

@@ -371,8 +371,8 @@ def frame_of(func: str, src: np.ndarray, params: ScanLineParams, mask: np.ndarra
 def strength_of(func: str, frame: RangeFrame, params: ScanLineParams) -> EdgeStrength:
     """Edge strengths of a checked range image."""
     strength = _no_strength(frame.shape)
-    noise = kernel_noise(func, params.noise, frame)
-    _core.edge_strength(*frame.kernel_args, *noise, kernel_parameters(params, frame), *strength)
+    kernel = frame.kernel(kernel_noise(func, params.noise, frame))
+    _core.edge_strength(kernel, kernel_options(params, frame), frame.threads, *strength)
     return strength
 
 
@@ -390,17 +390,17 @@ _POINT += [("kind", "u1"), ("significance", "f4"), ("direction", "u1")]
 
 def points_of(func: str, frame: RangeFrame, params: ScanLineParams) -> np.ndarray:
     """Edge points of a checked range image."""
-    noise = kernel_noise(func, params.noise, frame)
-    candidates = _core.edge_candidates(*frame.kernel_args, *noise, kernel_parameters(params, frame))
+    kernel = frame.kernel(kernel_noise(func, params.noise, frame))
+    candidates = _core.edge_candidates(kernel, kernel_options(params, frame), frame.threads)
     points = np.empty(len(candidates["x"]), dtype=_POINT)
     for name in points.dtype.names:
         points[name] = candidates[name]
     return points
 
 
-def kernel_parameters(params: ScanLineParams, frame: RangeFrame) -> _core.Parameters:
+def kernel_options(params: ScanLineParams, frame: RangeFrame) -> _core.ScanLineOptions:
     """Checked parameters in the form that kernels take."""
-    return _core.Parameters(
+    return _core.ScanLineOptions(
         eps=params.eps or 0.0,
         eps_factor=params.epsFactor,
         directions=params.directions,
@@ -414,5 +414,4 @@ def kernel_parameters(params: ScanLineParams, frame: RangeFrame) -> _core.Parame
         spaced=params.K is not None or params.pixelSize is not None or frame.samples.ndim == 3,
         merge_significance=params.mergeSignificance,
         min_significance=params.minSignificance,
-        threads=frame.threads,
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from . import _core
 from ._args import deliver
-from .edges import frame_of, kernel_parameters, params_of, takes_scan_line_params
+from .edges import frame_of, kernel_options, params_of, takes_scan_line_params
 from .noise import kernel_noise
 
 
@@ -75,6 +75,6 @@ def flyingPixels(
     params = params_of(func, eps, options)
     frame = frame_of(func, src, params, mask)
     flying = np.zeros(frame.shape, np.uint8)
-    noise = kernel_noise(func, params.noise, frame)
-    _core.flying_pixels(*frame.kernel_args, *noise, kernel_parameters(params, frame), flying)
+    kernel = frame.kernel(kernel_noise(func, params.noise, frame))
+    _core.flying_pixels(kernel, kernel_options(params, frame), frame.threads, flying)
     return deliver(func, "dst", flying, dst)

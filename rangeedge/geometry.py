@@ -59,10 +59,9 @@ class RangeFrame:
         """Distance along the viewing axis, NaN where invalid."""
         return 1 / self.ordinate if self.projective else -self.ordinate
 
-    @property
-    def kernel_args(self) -> tuple[Any, ...]:
-        """What every kernel on scan lines takes first."""
-        return self.samples, self.projective, self.to_plane, self.axis
+    def kernel(self, noise: _core.Noise) -> _core.Frame:
+        """The image and its noise as every kernel takes it."""
+        return _core.Frame(self.samples, self.projective, self.to_plane, self.axis, noise)
 
 
 def range_frame(

@@ -153,8 +153,8 @@ def _fitted(z: np.ndarray, sigma: np.ndarray) -> tuple[float, float]:
     return (float(single[0]), 0.0) if residuals[0] < residuals[1] else (0.0, float(single[1]))
 
 
-def kernel_noise(func: str, noise: Any, frame: RangeFrame) -> tuple[tuple[float, ...], np.ndarray | None]:
-    """The `noise` argument of a detector as kernels take it: coefficients with the correlation, and a map or None."""
+def kernel_noise(func: str, noise: Any, frame: RangeFrame) -> _core.Noise:
+    """The `noise` argument of a detector as kernels take it."""
     if noise is None:
         noise = noise_of(frame)
     elif not isinstance(noise, (NoiseModel, np.ndarray)):
@@ -162,11 +162,11 @@ def kernel_noise(func: str, noise: Any, frame: RangeFrame) -> tuple[tuple[float,
     if isinstance(noise, NoiseModel):
         if min(noise.a, noise.b, noise.c) < 0 and not (noise(np.abs(frame.depth[frame.valid > 0])) > 0).all():
             raise fail(func, "noise", "a model that is positive at every depth of the image", noise)
-        return (noise.a, noise.b, noise.c, noise.correlation), None
+        return _core.Noise(noise.a, noise.b, noise.c, noise.correlation)
     expected = f"a number, a NoiseModel, or a real array of shape {frame.shape}, > 0 at valid pixels"
     if noise.shape != frame.shape or noise.dtype.kind not in "iuf":
         raise fail(func, "noise", expected, described(noise), cv2.Error.StsBadSize)
     sigmas = np.ascontiguousarray(noise, dtype=np.float32)
     if not np.all((sigmas > 0) & np.isfinite(sigmas), where=frame.valid > 0):
         raise error(func, f"`noise` must be {expected}", cv2.Error.StsOutOfRange)
-    return (0.0, 0.0, 0.0, 1.0), sigmas
+    return _core.Noise(0.0, 0.0, 0.0, 1.0, sigmas)

@@ -319,16 +319,14 @@ def _grow(
     markers = labels32s(func, "markers", markers, frame.shape)
     edges = None if edges is None else image8(func, "edges", edges, frame.shape)
     growing = growing.checked(func)
-    parameters = _core.RegionParameters(
+    options = _core.RegionOptions(
         tolerance=growing.tolerance,
         smooth_angle=growing.smoothAngle,
         min_area=growing.minArea,
         new_seeds=boolean(func, "newSeeds", newSeeds),
     )
-    arguments = surface_map(frame, *kernel_noise(func, noise, frame))
-    arguments["edges"] = edges
     labels = np.empty(frame.shape, np.int32)
-    _core.grow_regions(**arguments, markers=markers, parameters=parameters, labels=labels)
+    _core.grow_regions(surface_map(frame, kernel_noise(func, noise, frame), edges), markers, options, labels)
     return labels
 
 

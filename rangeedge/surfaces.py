@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
+from . import _core
 from .geometry import RangeFrame
 
 SURFACE = np.dtype([("curved", np.bool_), ("centroid", "3f8"), ("normal", "3f8"), ("quadric", "10f8"), ("rms", "f8")])
@@ -13,22 +12,13 @@ _CURVED_GAIN = 0.8  # a quadratic must lower the rms of a plane to this share
 _QUADRIC_POINTS = 40  # fewer tell no curvature
 
 
-def surface_map(frame: RangeFrame, coefficients: tuple[float, ...], noise_map: np.ndarray | None) -> dict[str, Any]:
-    """What the kernels on surfaces take: places on the image plane, ordinates and their noise; no edges."""
+def surface_map(frame: RangeFrame, noise: _core.Noise, edges: np.ndarray | None) -> _core.RangeMap:
+    """What the kernels on surfaces take: places on the image plane, ordinates and their noise, edges."""
     x, y, to_plane = _places(frame)
     seen = frame.ordinate[frame.valid.view(bool)]
     offset = float(seen[:: max(1, len(seen) // 4096)].mean(dtype=np.float64)) if len(seen) else 0.0
-    return dict(
-        x=x,
-        y=y,
-        ordinate=(frame.ordinate - frame.ordinate.dtype.type(offset)).astype(np.float32, copy=False),
-        offset=offset,
-        projective=frame.projective,
-        to_plane=to_plane,
-        noise=coefficients[:3],
-        noise_map=noise_map,
-        edges=None,
-    )
+    ordinate = (frame.ordinate - frame.ordinate.dtype.type(offset)).astype(np.float32, copy=False)
+    return _core.RangeMap(frame.kernel(noise), x, y, ordinate, offset, to_plane, edges)
 
 
 def _places(frame: RangeFrame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[float, ...]]:

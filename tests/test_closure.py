@@ -38,15 +38,9 @@ def noisy(depth, sigma=0.1, seed=0):
 def is_surface(src, inside, sigma=0.1, tolerance=3.0, share=0.9):
     """The kernel's verdict on a connected set of pixels: nothing dilated."""
     regions = np.zeros(inside.shape, np.int32)
-    _core.verified_regions(
-        **dict(surface_map(range_frame("test", src), (sigma, 0.0, 0.0), None), edges=(~inside).view(np.uint8)),
-        correlation=1.0,
-        tolerance=tolerance,
-        share=share,
-        dilations=0,
-        min_area=1,
-        regions=regions,
-    )
+    surfaces = surface_map(range_frame("test", src), _core.Noise(sigma, 0.0, 0.0, 1.0), (~inside).view(np.uint8))
+    options = _core.ClosureOptions(correlation=1.0, tolerance=tolerance, share=share, dilations=0, min_area=1)
+    _core.verified_regions(surfaces, options, regions)
     assert not regions.any() or np.array_equal(regions, inside.astype(np.int32))
     return bool(regions.any())
 

@@ -157,31 +157,27 @@ def test_import_is_quick_and_leaves_scikit_image_for_later():
 
 def test_the_package_carries_its_types():
     assert (PACKAGE / "py.typed").exists()
-    assert (PACKAGE / "_core.pyi").exists()
 
 
-def test_stub_names_what_the_compiled_module_has():
-    def arguments(function):
-        return [a.arg for a in (*function.args.posonlyargs, *function.args.args, *function.args.kwonlyargs)]
+@pytest.fixture
+def stub():
+    """The types of the compiled module."""
+    path = PACKAGE / "_core.pyi"
+    if (PACKAGE / "core").exists() and not path.exists():
+        pytest.skip("the module was built in place and its stub left in the build folder")
+    return path.read_text()
 
-    def built(function):
-        """The parameter names of every overload."""
-        return {
-            tuple(arguments(ast.parse(re.sub(r"ndarray\[[^]]*\]", "ndarray", text) + ": ...").body[0]))
-            for text, *_ in function.__nb_signature__
-        }
 
-    stub = {
-        node.name: node
-        for node in ast.parse((PACKAGE / "_core.pyi").read_text()).body
-        if isinstance(node, (ast.FunctionDef, ast.ClassDef))
-    }
-    assert sorted(stub) == sorted(name for name in dir(_core) if not name.startswith("_"))
-    for name, node in stub.items():
-        compiled = getattr(_core, name)
-        if isinstance(node, ast.ClassDef):
-            node, compiled = node.body[0], compiled.__init__
-        assert built(compiled) == {tuple(arguments(node))}, name
+def test_stub_names_what_the_compiled_module_has(stub):
+    defined = {node.name for node in ast.parse(stub).body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+    assert defined == {name for name in dir(_core) if not name.startswith("_")}
+
+
+def test_stub_is_generated_from_the_compiled_module(stub):
+    stubgen = pytest.importorskip("nanobind.stubgen")
+    generator = stubgen.StubGen(_core)
+    generator.put(_core)
+    assert generator.get() == stub
 
 
 @pytest.mark.skipif(np.lib.NumpyVersion(np.__version__) < "2.0.0", reason="examples print scalars as NumPy 2 does")

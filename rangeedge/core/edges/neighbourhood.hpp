@@ -1,0 +1,139 @@
+// The neighbourhood of an edge candidate: the candidates of its kind within a few pixels, with weights that fall with
+// their distance. Sums over it are what joins candidates; they are computed for several neighbours side by side.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <algorithm>
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "base/parallel.hpp"
+#include "base/simd.hpp"
+#include "edges/candidate.hpp"
+#include "edges/cells.hpp"
+#include "scanline/line.hpp"
+
+namespace rangeedge {
+
+constexpr float reach = Cells::size;  // pixels; weights fall from 1 at the candidate itself to 0 there
+
+// What neighbours are asked for, one array each: their places, and from `first_field` on what the task needs.
+enum Field { x_field, y_field, first_field };
+
+// What sums over neighbours need of candidates, by cells, in arrays that may be read a few lanes beyond their end.
+class NeighbourGrid {
+public:
+    NeighbourGrid(const std::vector<Candidate>& candidates, int rows, int cols, int fields)
+        : cells_(rows, cols), stride_(candidates.size() + lanes), order_(candidates.size()), kinds_(stride_, 0),
+          fields_(stride_ * static_cast<std::size_t>(fields), 0.0f) {
+        cells_.count(candidates);
+        cells_.assign(candidates, [&](const Candidate& c, std::size_t k) {
+            order_[k] = static_cast<std::int32_t>(&c - candidates.data());
+            kinds_[k] = (c.kind & kinds) | c.direction << direction_shift;
+            field(x_field)[k] = c.x;
+            field(y_field)[k] = c.y;
+        });
+    }
+
+    float* field(int f) { return fields_.data() + stride_ * static_cast<std::size_t>(f); }
+    const float* field(int f) const { return fields_.data() + stride_ * static_cast<std::size_t>(f); }
+    const int* kinds_of_all() const { return kinds_.data(); }
+    // Calls visit(index of a candidate, its place in the arrays) for all.
+    template <class Visit>
+    void for_each(Visit&& visit) const {
+        for (std::size_t k = 0; k < order_.size(); ++k) visit(static_cast<std::size_t>(order_[k]), k);
+    }
+    // From now on the candidate at place k is nobody's neighbour.
+    void remove(std::size_t k) { kinds_[k] = 0; }
+
+    // A candidate and the places, in three rows of cells, where its neighbours are.
+    struct Near {
+        const NeighbourGrid* grid;
+        float x, y;
+        int kinds;
+        int first[3], last[3];
+    };
+
+    // Calls visit(index, near) for all candidates, several rows of cells at a time.
+    template <class Visit>
+    void for_each_near(Team& team, Visit&& visit) const {
+        std::atomic<int> taken{0};
+        team.run([&](int) {
+            for (int row; (row = taken++) < cells_.rows();)
+                for (int col = 0; col < cells_.cols(); ++col) visit_cell(col, row, visit);
+        });
+    }
+
+    static constexpr int direction_shift = 8;  // of the bit of a direction in the array of kinds
+
+private:
+    static constexpr int kinds = jump_bit | convex_bit | concave_bit;
+    static constexpr int lanes = Floats<16>::count;
+
+    template <class Visit>
+    void visit_cell(int col, int row, Visit&& visit) const {
+        const int begin = cells_.begin(col, row), end = cells_.end(col, row);
+        if (begin == end) return;
+        Near near{this, 0, 0, 0, {}, {}};
+        const int left = std::max(0, col - 1), right = std::min(cells_.cols() - 1, col + 1);
+        for (int i = 0; i < 3; ++i) {
+            const int y = row + i - 1;
+            if (y < 0 || y >= cells_.rows()) continue;
+            near.first[i] = cells_.begin(left, y);
+            near.last[i] = cells_.end(right, y);
+        }
+        for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+            near.x = field(x_field)[k];
+            near.y = field(y_field)[k];
+            near.kinds = kinds_[k] & kinds;
+            visit(static_cast<std::size_t>(order_[k]), near);
+        }
+    }
+
+    Cells cells_;
+    std::size_t stride_;
+    std::vector<std::int32_t> order_;
+    std::vector<int> kinds_;
+    std::vector<float> fields_;
+};
+
+// Calls visit(k, weights, dx, dy) for the candidates k, k + 1, ... several at a time: their distances from the one they
+// are near, and weights (1 - d^2 / reach^2)^2 that are 0 for those beyond reach or of another kind.
+template <int bytes, class Visit>
+RANGEEDGE_INLINE void for_each_lanes(const NeighbourGrid::Near& near, Visit&& visit) {
+    using F = Floats<bytes>;
+    using I = Ints<bytes>;
+    const float *x = near.grid->field(x_field), *y = near.grid->field(y_field);
+    const int* kinds_there = near.grid->kinds_of_all();
+    const F cx = F::all(near.x), cy = F::all(near.y), one = F::all(1), per_square = F::all(1 / (reach * reach));
+    const F half = F::all(0.5f);
+    const I own = I::all(near.kinds), none = I::all(0);
+    for (int i = 0; i < 3; ++i)
+        for (int k = near.first[i]; k < near.last[i]; k += F::count) {
+            const F dx = F::load(x + k) - cx, dy = F::load(y + k) - cy;
+            F rest = one - (dx * dx + dy * dy) * per_square;
+            rest = half * (rest + abs(rest));  // 0 where negative
+            const I alike = sign_mask(none - (I::load(kinds_there + k) & own));
+            const I counts = alike & sign_mask(I::from(k) - I::all(near.last[i]));
+            visit(k, from_bits(bits(rest * rest) & counts), dx, dy);
+        }
+}
+
+// One step along a scan line.
+struct Step {
+    int dcol, drow;
+};
+inline Step step_of(int direction) {
+    return {direction == cols_bit ? 0 : 1, direction == rows_bit ? 0 : direction == diag45_bit ? -1 : 1};
+}
+
+// The line on which a candidate and its neighbours lie: across it, their positions vary least.
+struct CommonLine {
+    double normal[2];  // of unit length
+    double offset;     // of the line from the candidate, along the normal
+    bool found;
+};
+CommonLine common_line(const NeighbourGrid::Near& near);
+
+}  // namespace rangeedge

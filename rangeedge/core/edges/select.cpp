@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "edges/select.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+#include "image/components.hpp"
+
+namespace rangeedge {
+
+void long_components(const std::uint8_t* edges, int rows, int cols, int min_length, std::uint8_t* kept) {
+    const auto stride = static_cast<std::size_t>(cols) + 2, width = static_cast<std::size_t>(cols);
+    std::vector<std::uint8_t> image(stride * (static_cast<std::size_t>(rows) + 2), 0);
+    for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row)
+        for (std::size_t col = 0; col < width; ++col)
+            image[(row + 1) * stride + col + 1] = edges[row * width + col] != 0;
+    std::fill_n(kept, static_cast<std::size_t>(rows) * width, std::uint8_t{0});
+    const Components parts(image.data(), rows, cols, 8);
+    for (int i = 0; i < parts.count(); ++i) {
+        int left = cols, right = -1, top = rows, bottom = -1;
+        for (const auto [begin, end] : parts.runs(i)) {
+            left = std::min(left, parts.col_of(begin)), right = std::max(right, parts.col_of(end - 1));
+            top = std::min(top, parts.row_of(begin)), bottom = std::max(bottom, parts.row_of(begin));
+        }
+        if (std::max(right - left, bottom - top) + 1 < min_length) continue;
+        for (const auto [begin, end] : parts.runs(i)) {
+            const auto row = static_cast<std::size_t>(parts.row_of(begin));
+            std::fill_n(kept + row * width + parts.col_of(begin), end - begin, std::uint8_t{1});
+        }
+    }
+}
+
+}  // namespace rangeedge

@@ -1,0 +1,109 @@
+// The strengths of an edge candidate and its type (paper, 4.2 and Fig. 4).
+//
+// Between the segments of curves f1 and f2, which end at the samples x1 and x2, the paper defines at x = (x1 + x2) / 2
+//
+//     jump    |f1(x) - f2(x)|
+//     crease  the angle between the normals (-f1'(x), 1) and (-f2'(x), 1)
+//     convex  f1'(x) > f2'(x), else concave
+//
+// or alternatively, extrapolating from the end points by z1 + f1'(x1) (x - x1) and z2 - f2'(x2) (x2 - x),
+//
+//     jump    |(z1 + f1'(x1) (x - x1)) - (z2 - f2'(x2) (x2 - x))|
+//     crease  the angle between the normals (-f1'(x1), 1) and (-f2'(x2), 1)
+//     convex  f1'(x1) > f2'(x2), else concave
+//
+// Here x is the position of the edge, the midpoint being the case without adaptation. Jumps are compared as depths,
+// normals in the plane of the scan line (line.hpp), and every strength has a standard deviation, by which candidates of
+// noise are told from edges.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <algorithm>
+#include <cmath>
+
+#include "base/angle.hpp"
+#include "scanline/curve.hpp"
+#include "scanline/line.hpp"
+
+namespace rangeedge {
+
+// What one of the curves says of the edge.
+struct EdgeSide {
+    double ordinate;  // expected at the edge
+    double slope;     // f'
+    Tangent tangent;
+    double value_variance, slope_variance;  // for samples of unit variance
+    double angle_per_slope;
+};
+
+// First form: the curve at the position x of the edge.
+template <class T>
+EdgeSide at_midpoint(const Line<T>& line, const Curve& f, double x) {
+    const double z = f.value(x), slope = f.slope(x);
+    const Tangent tangent = line.tangent(x, z, slope);
+    return {z, slope, tangent, f.value_variance(x), f.slope_variance(x), line.angle_per_slope(tangent, z)};
+}
+
+// Second form: extrapolated to x from an end point, the sample k, z1 + f'(x1) (x - x1).
+template <class T>
+EdgeSide from_endpoint(const Line<T>& line, const Curve& f, int k, double x) {
+    const double x1 = line.abscissa(k), z1 = line.ordinate(k), slope = f.slope(x1);
+    const Tangent tangent = line.tangent(x1, z1, slope);
+    return {z1 + slope * (x - x1),
+            slope,
+            tangent,
+            f.value_variance(x1),
+            f.slope_variance(x1),
+            line.angle_per_slope(tangent, z1)};
+}
+
+// |f1(x) - f2(x)|, a length.
+template <class T>
+double jump_strength(const Line<T>& line, const EdgeSide& f1, const EdgeSide& f2) {
+    return std::abs(line.depth(f1.ordinate) - line.depth(f2.ordinate));
+}
+
+// No more than the difference of the depths at the end points, and what either curve adds to them on the way to x, which
+// is no more than it changes over the last sample before. Over a wide gap, or close to the horizon, a curve runs away.
+template <class T>
+double largest_jump(const Line<T>& line, const Curve& f1, const Curve& f2, int before, int after) {
+    const double x1 = line.abscissa(before), x2 = line.abscissa(after);
+    const double z1 = line.depth(f1.value(x1)), z2 = line.depth(f2.value(x2));
+    const double way = std::min((x2 - x1) / (after - before), (x2 - x1) / 2);
+    return std::abs(z1 - z2) + std::abs(z1 - line.depth(f1.value(x1 - way))) +
+           std::abs(z2 - line.depth(f2.value(x2 + way)));
+}
+
+// Whether the samples from `before` to `after` and two on either side run on too smoothly for a step of that size, which
+// curves that do not quite follow them pretend. A sharp step has third differences of twice its size, an even ramp over n
+// samples of step / 2n.
+template <class T>
+bool is_smooth(const Line<T>& line, int before, int after, int n, double step) {
+    const int first = std::max(before - 2, 0), last = std::min(after + 2, line.path.size - 1);
+    double largest = 0;
+    for (int k = first; k + 3 <= last; ++k) {
+        const double slopes = line.ordinate(k + 2) - line.ordinate(k + 1);
+        const double third = line.ordinate(k + 3) - 3 * slopes - line.ordinate(k);
+        if (!(std::abs(third) <= HUGE_VAL)) return false;  // no data
+        largest = std::max(largest, std::abs(third));
+    }
+    return last - first >= 3 && largest < step / (2.5 * n - 1.5);
+}
+
+// The angle between the normals, in degrees: that between the tangents.
+inline double crease_strength(const EdgeSide& f1, const EdgeSide& f2) {
+    return angle_between(cross(f1.tangent, f2.tangent), dot(f1.tangent, f2.tangent));
+}
+
+// f1' > f2': on a grid, with the tangents (1, -f1') and (1, -f2'), their cross product is f1' - f2'.
+inline bool is_convex(const EdgeSide& f1, const EdgeSide& f2) { return cross(f1.tangent, f2.tangent) > 0; }
+
+// The standard deviations of f1(x) - f2(x), an ordinate, and of the crease, for samples of deviation sigma.
+inline double jump_deviation(const EdgeSide& f1, const EdgeSide& f2, double sigma) {
+    return sigma * std::sqrt(f1.value_variance + f2.value_variance);
+}
+inline double crease_deviation(const EdgeSide& f1, const EdgeSide& f2, double sigma) {
+    const double a1 = f1.angle_per_slope, a2 = f2.angle_per_slope;
+    return degrees_per_radian * sigma * std::sqrt(a1 * a1 * f1.slope_variance + a2 * a2 * f2.slope_variance);
+}
+
+}  // namespace rangeedge

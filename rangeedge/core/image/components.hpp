@@ -1,0 +1,118 @@
+// Connected components of an image, as runs of pixels in rows.
+//
+// One pass over the image finds the runs of equal values and joins each one with those of the row above that touch it,
+// in a forest whose roots are the first runs of components (union and find); a second pass over the runs numbers the
+// components and sorts the runs by them.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+namespace rangeedge {
+
+// Components of equal values other than 0, in raster order of first pixels. Images have a margin of one pixel, all 0,
+// and pixels are known by their index there.
+class Components {
+public:
+    struct Run {
+        int begin, end;  // pixels [begin, end)
+    };
+    struct Range {
+        const Run *first, *last;
+        const Run* begin() const { return first; }
+        const Run* end() const { return last; }
+    };
+
+    // `connectivity` is 4 or 8.
+    template <class T>
+    Components(const T* image, int rows, int cols, int connectivity = 4) : stride_(cols + 2) {
+        const int stride = stride_, reach = connectivity == 8;
+        std::vector<Run> found;
+        std::vector<int> parent;  // of runs; roots are first in raster order
+        const auto root = [&](std::size_t i) {
+            int r = static_cast<int>(i);
+            while (parent[static_cast<std::size_t>(r)] != r) {
+                int& up = parent[static_cast<std::size_t>(r)];
+                r = up = parent[static_cast<std::size_t>(up)];
+            }
+            return r;
+        };
+        std::size_t above = 0;  // first run that may touch the next one from the row above
+        for (int row = 0; row < rows; ++row) {
+            const std::size_t row_begin = found.size();
+            int p = (row + 1) * stride + 1;
+            for (const int end = p + cols; (p = find_value(image, p, end)) < end;) {
+                const int begin = p;
+                const T value = image[begin];
+                while (image[p] == value) ++p;
+                const Run run{begin, p};
+                const std::size_t i = found.size();
+                found.push_back(run);
+                parent.push_back(static_cast<int>(i));
+                while (above < row_begin && found[above].end + stride + reach <= run.begin) ++above;
+                for (std::size_t k = above; k < row_begin && found[k].begin + stride < run.end + reach; ++k) {
+                    if (image[found[k].begin] != value) continue;
+                    const auto [low, high] = std::minmax({root(k), root(i)});
+                    parent[static_cast<std::size_t>(high)] = low;
+                }
+            }
+            above = row_begin;
+        }
+        sort(found, parent);
+    }
+
+    int count() const { return static_cast<int>(areas_.size()); }
+    int area(int i) const { return areas_[static_cast<std::size_t>(i)]; }
+    // Of a pixel, without the margin.
+    int row_of(int pixel) const { return pixel / stride_ - 1; }
+    int col_of(int pixel) const { return pixel % stride_ - 1; }
+    // Its runs in raster order.
+    Range runs(int i) const {
+        const auto k = static_cast<std::size_t>(i);
+        return {runs_.data() + starts_[k], runs_.data() + starts_[k + 1]};
+    }
+
+private:
+    // The first pixel from p, and before `end`, that is not 0; else `end`.
+    template <class T>
+    static int find_value(const T* image, int p, int end) {
+        std::uint64_t word;
+        constexpr int step = sizeof word / sizeof(T);
+        while (p + step <= end && (std::memcpy(&word, image + p, sizeof word), !word)) p += step;
+        while (p < end && !image[p]) ++p;
+        return p;
+    }
+
+    void sort(const std::vector<Run>& found, std::vector<int>& parent) {
+        std::vector<std::size_t> sizes;
+        for (std::size_t i = 0; i < found.size(); ++i) {
+            int& own = parent[i];  // becomes the component of the run
+            if (own == static_cast<int>(i)) {
+                own = count();
+                areas_.push_back(0);
+                sizes.push_back(0);
+            } else {
+                own = parent[static_cast<std::size_t>(own)];
+            }
+            areas_[static_cast<std::size_t>(own)] += found[i].end - found[i].begin;
+            ++sizes[static_cast<std::size_t>(own)];
+        }
+        starts_.assign(1, 0);
+        for (const std::size_t size : sizes) starts_.push_back(starts_.back() + size);
+        runs_.resize(found.size());
+        auto next = starts_;
+        for (std::size_t i = 0; i < found.size(); ++i) runs_[next[static_cast<std::size_t>(parent[i])]++] = found[i];
+    }
+
+    int stride_;
+    std::vector<Run> runs_;            // by component
+    std::vector<std::size_t> starts_;  // of components in runs_
+    std::vector<int> areas_;
+};
+
+}  // namespace rangeedge

@@ -1,0 +1,95 @@
+// Scan lines and edges.
+// SPDX-License-Identifier: Apache-2.0
+#include "base/simd.hpp"
+#include "edges/combine.hpp"
+#include "edges/detect.hpp"
+#include "edges/select.hpp"
+#include "image/pixels.hpp"
+#include "python/frame.hpp"
+#include "scanline/split.hpp"
+
+namespace rangeedge::python {
+namespace {
+
+template <class T>
+auto split_scan_line(const Values<T>& y, const Values<T>& x, double eps) {
+    std::vector<Segment> segments;
+    {
+        nb::gil_scoped_release release;
+        std::vector<T> samples(y.data(), y.data() + y.size());
+        samples.resize(y.size() + padding);
+        Splitter<T> splitter;
+        splitter.add({samples.data(), x.data(), nullptr, static_cast<int>(y.size()), static_cast<T>(eps)});
+        splitter.split();
+        splitter.for_each_segment(0, [&](const Segment& s) { segments.push_back(s); });
+    }
+    return handed_over<int>(std::move(segments));
+}
+
+std::vector<Candidate> candidates_of(const BoundFrame& bound, const ScanLineOptions& options, int threads) {
+    return std::visit([&](const auto& frame) { return find_candidates(frame, options, threads); }, bound.frame);
+}
+
+// One array a field, by the field's name.
+nb::typed<nb::dict, nb::str, nb::any> edge_candidates(const BoundFrame& frame, const ScanLineOptions& options,
+                                                      int threads) {
+    std::vector<Candidate> candidates;
+    {
+        nb::gil_scoped_release release;
+        candidates = candidates_of(frame, options, threads);
+        put_in_order(candidates);
+    }
+    nb::dict result;
+    const auto add = [&](const char* name, auto member) {
+        using E = std::decay_t<decltype(candidates[0].*member)>;
+        std::vector<E> values;
+        values.reserve(candidates.size());
+        for (const Candidate& c : candidates) values.push_back(c.*member);
+        result[name] = handed_over<E>(std::move(values));
+    };
+    add("x", &Candidate::x);
+    add("y", &Candidate::y);
+    add("jump", &Candidate::jump);
+    add("crease", &Candidate::crease);
+    add("kind", &Candidate::kind);
+    add("significance", &Candidate::significance);
+    add("direction", &Candidate::direction);
+    return result;
+}
+
+void edge_strength(const BoundFrame& bound, const ScanLineOptions& options, int threads, const OutImage<float>& jump,
+                   const OutImage<float>& crease, const OutImage<std::uint8_t>& kind,
+                   const OutImage<float>& significance) {
+    combine(candidates_of(bound, options, threads), jump.data(), crease.data(), kind.data(), significance.data());
+    std::visit([&](const auto& frame) { mark_boundary(frame, boundary_bit, kind.data()); }, bound.frame);
+}
+
+void flying_pixels(const BoundFrame& bound, const ScanLineOptions& options, int threads,
+                   const OutImage<std::uint8_t>& flying) {
+    std::visit([&](const auto& frame) { find_candidates(frame, options, threads, flying.data()); }, bound.frame);
+}
+
+void keep_long_components(const Image<std::uint8_t>& edges, int min_length, const OutImage<std::uint8_t>& kept) {
+    long_components(edges.data(), rows(edges), cols(edges), min_length, kept.data());
+}
+
+}  // namespace
+
+void bind_edges(nb::module_& m) {
+    using O = ScanLineOptions;
+    bind_options(m, "ScanLineOptions", field("eps", &O::eps), field("eps_factor", &O::eps_factor),
+                 field("directions", &O::directions), field("interpolate", &O::interpolate),
+                 field("endpoint", &O::endpoint), field("normals", &O::normals), field("max_shift", &O::max_shift),
+                 field("max_gap", &O::max_gap), field("max_smear", &O::max_smear), field("shadows", &O::shadows),
+                 field("spaced", &O::spaced), field("merge_significance", &O::merge_significance),
+                 field("min_significance", &O::min_significance));
+    m.def("split_scan_line", &split_scan_line<float>, array("y"), optional_array("x"), "eps"_a);
+    m.def("split_scan_line", &split_scan_line<double>, array("y"), optional_array("x"), "eps"_a);
+    m.def("edge_candidates", &edge_candidates, "frame"_a, "options"_a, "threads"_a);
+    m.def("edge_strength", &edge_strength, "frame"_a, "options"_a, "threads"_a, array("jump"), array("crease"),
+          array("kind"), array("significance"), Unlocked());
+    m.def("flying_pixels", &flying_pixels, "frame"_a, "options"_a, "threads"_a, array("flying"), Unlocked());
+    m.def("long_components", &keep_long_components, array("edges"), "min_length"_a, array("kept"), Unlocked());
+}
+
+}  // namespace rangeedge::python
