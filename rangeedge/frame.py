@@ -24,7 +24,8 @@ class Frame:
 
     `samples` holds inverse depth (`projective`) or height of shape (H, W), or points of shape (H, W, 3).
     `to_plane` takes (column, row, 1) to normalised image coordinates or to lengths; `axis` is the viewing direction;
-    `heightMap` says that heights grow toward the viewer in the image, too. `noise` is a model or a map of deviations.
+    `heightMap` says that heights grow toward the viewer in the image, too; `spaced` that the spacing of pixels is known
+    in the unit of the values. `noise` is a model or a map of deviations.
     """
 
     samples: np.ndarray
@@ -32,6 +33,7 @@ class Frame:
     to_plane: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
     heightMap: bool = False
+    spaced: bool = True
     noise: NoiseModel | np.ndarray | None = None
 
     @property
@@ -134,7 +136,7 @@ def read_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None 
         return _points(src, inside, heightMap)
     if K is not None:
         return _pinhole(src, params.depthFactor, inside, K)
-    return _grid(src, params.depthFactor, inside, pixelSize or (1.0, 1.0), heightMap)
+    return _grid(src, params.depthFactor, inside, pixelSize, heightMap)
 
 
 def _lengths(src: np.ndarray, depthFactor: float, heightMap: bool = False) -> np.ndarray:
@@ -164,7 +166,7 @@ def _grid(
     src: np.ndarray,
     depthFactor: float,
     inside: np.ndarray | None,
-    spacing: tuple[float, float],
+    pixelSize: tuple[float, float] | None,
     heightMap: bool,
 ) -> Frame:
     values = _lengths(src, depthFactor, heightMap)
@@ -175,7 +177,10 @@ def _grid(
     if inside is not None:
         height = height.copy() if np.shares_memory(height, src) else height
         height[~inside] = np.nan
-    return Frame(height, False, (spacing[0], 0.0, 0.0, 0.0, spacing[1], 0.0), heightMap=heightMap)
+    dx, dy = pixelSize or (1.0, 1.0)
+    return Frame(
+        height, False, (dx, 0.0, 0.0, 0.0, dy, 0.0), heightMap=heightMap, spaced=pixelSize is not None
+    )
 
 
 def _points(src: np.ndarray, inside: np.ndarray | None, heightMap: bool) -> Frame:

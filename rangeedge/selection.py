@@ -11,7 +11,7 @@ import numpy as np
 from . import _check, _core
 from ._check import public
 from ._option import takes
-from .constants import EDGE_OCCLUDING
+from .constants import EDGE_BOUNDARY, EDGE_OCCLUDING
 from .edges import EdgeStrength
 from .options import SELECTION, Selection
 
@@ -269,10 +269,13 @@ selectEdges.__signature__ = inspect.signature(_of_strength)  # type: ignore[attr
 
 
 def select_strength(strength: EdgeStrength, selection: Selection) -> np.ndarray:
-    """The edge map before thinning: jumps on their nearer side, and creases that do not stand alone."""
+    """The edge map before thinning: jumps on their nearer side, creases that do not stand alone, borders if wanted."""
     jump = cv2.copyTo(strength.jump, strength.kind & np.uint8(EDGE_OCCLUDING))
     crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold)
-    return select_maps(jump, crease, selection)
+    edges = select_maps(jump, crease, selection)
+    if selection.boundaryEdges:
+        edges[(strength.kind & EDGE_BOUNDARY) > 0] = 255
+    return edges
 
 
 def select_maps(jump: np.ndarray, crease: np.ndarray, selection: Selection) -> np.ndarray:

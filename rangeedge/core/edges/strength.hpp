@@ -17,6 +17,7 @@
 // noise are told from edges.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <cmath>
 
 #include "base/angle.hpp"
@@ -59,6 +60,33 @@ EdgeSide from_endpoint(const Line<T>& line, const Curve& f, int k, double x) {
 template <class T>
 double jump_strength(const Line<T>& line, const EdgeSide& f1, const EdgeSide& f2) {
     return std::abs(line.depth(f1.ordinate) - line.depth(f2.ordinate));
+}
+
+// No more than the difference of the depths at the end points, and what either curve adds to them on the way to x, which
+// is no more than it changes over the last sample before. Over a wide gap, or close to the horizon, a curve runs away.
+template <class T>
+double largest_jump(const Line<T>& line, const Curve& f1, const Curve& f2, int before, int after) {
+    const double x1 = line.abscissa(before), x2 = line.abscissa(after);
+    const double z1 = line.depth(f1.value(x1)), z2 = line.depth(f2.value(x2));
+    const double way = std::min((x2 - x1) / (after - before), (x2 - x1) / 2);
+    return std::abs(z1 - z2) + std::abs(z1 - line.depth(f1.value(x1 - way))) +
+           std::abs(z2 - line.depth(f2.value(x2 + way)));
+}
+
+// Whether the samples from `before` to `after` and two on either side run on too smoothly for a step of that size, which
+// curves that do not quite follow them pretend. A sharp step has third differences of twice its size, an even ramp over n
+// samples of step / 2n.
+template <class T>
+bool is_smooth(const Line<T>& line, int before, int after, int n, double step) {
+    const int first = std::max(before - 2, 0), last = std::min(after + 2, line.path.size - 1);
+    double largest = 0;
+    for (int k = first; k + 3 <= last; ++k) {
+        const double slopes = line.ordinate(k + 2) - line.ordinate(k + 1);
+        const double third = line.ordinate(k + 3) - 3 * slopes - line.ordinate(k);
+        if (!(std::abs(third) <= HUGE_VAL)) return false;  // no data
+        largest = std::max(largest, std::abs(third));
+    }
+    return last - first >= 3 && largest < step / (2.5 * n - 1.5);
 }
 
 // The angle between the normals, in degrees: that between the tangents.

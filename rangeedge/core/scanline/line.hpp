@@ -32,7 +32,9 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/angle.hpp"
 #include "image/frame.hpp"
+#include "scanline/segment.hpp"
 
 namespace rangeedge {
 
@@ -51,7 +53,7 @@ struct Path {
 int line_count(int direction, int rows, int cols);
 Path line_path(int direction, int i, int rows, int cols);
 
-// A vector in the plane of a scan line, along a curve.
+// A vector in the plane of a scan line.
 struct Tangent {
     double s, r;
 };
@@ -76,6 +78,8 @@ struct Line {
     double depth(double ordinate) const { return frame->projective ? 1 / ordinate : -ordinate; }
     std::int64_t pixel(int k) const { return path.pixel(k, frame->cols); }
     double sigma_at(int k) const { return frame->noise.correlated_sigma(ordinate(k), pixel(k), frame->projective); }
+    double sigma_between(int i, int k) const { return (sigma_at(i) + sigma_at(k)) / 2; }
+    double sigma_of(const Segment& s) const { return sigma_between(s.left_middle(), s.right_middle()); }
     double tolerance_at(int k) const { return scale ? 1 / static_cast<double>(scale[k]) : tolerance; }
 
     // Of a curve that has this value and slope, by the abscissa, at an abscissa.
@@ -84,9 +88,22 @@ struct Line {
         if (!frame->projective) return {1, -m};
         return {value - (start + step * abscissa) * m, -kappa * m};
     }
+    // The angle at which the line of sight meets the straight line from sample i to sample k, in degrees.
+    double grazing_angle(int i, int k) const {
+        const Tangent a = point(i), b = point(k), way{b.s - a.s, b.r - a.r};
+        const Tangent sight = frame->projective ? Tangent{a.s + b.s, a.r + b.r} : Tangent{0, 1};
+        return angle_between(cross(way, sight), std::abs(dot(way, sight)));
+    }
     // How fast the angle of that tangent changes with the slope.
     double angle_per_slope(const Tangent& t, double value) const {
         return (frame->projective ? kappa * value : 1) * per_step / dot(t, t);
+    }
+
+private:
+    // The coordinates (s, r) of a sample.
+    Tangent point(int k) const {
+        const double w = start + step * abscissa(k), z = depth(ordinate(k));
+        return frame->projective ? Tangent{w * z, kappa * z} : Tangent{w, z};
     }
 };
 

@@ -61,7 +61,7 @@ void compute_costs(std::ptrdiff_t count, const Columns left, const Columns right
     RANGEEDGE_INDEPENDENT
     for (std::ptrdiff_t i = 0; i < count; ++i) {
         const double joint = residual_squares(left[i] + right[i], SegmentList::least_of(sigma[i]));
-        cost[i] = SegmentList::cost_of(joint, left.residual[i], right.residual[i], sigma[i]);
+        cost[i] = SegmentList::cost_of(joint, left.residual[i], right.residual[i], sigma[i], left.n[i] + right.n[i]);
     }
 }
 
@@ -85,8 +85,8 @@ void SegmentList::fill(const std::vector<Line<T>>& lines, const StripSegments& f
             const bool adjacent = own + 1 < last && s.last + 1 == found.segments[own + 1].first &&
                                   line.abscissa(s.last) < line.abscissa(s.last + 1);
             links[own] = {s, i, own > 0 ? own - 1 : end(), own + 1, false};
-            sigma[own] = adjacent ? line.sigma_at(s.last) : 0;
-            least[own] = least_of(line.sigma_at(s.reference()));
+            sigma[own] = adjacent ? line.sigma_between(s.last, s.last + 1) : 0;
+            least[own] = least_of(line.sigma_of(s));
         }
     }
 }
@@ -189,7 +189,7 @@ void UnevenSegments::update_cost(int i) {
     if (!(sigma[i] > 0)) return;
     const int right = links[i].next;
     const double joint = residual_squares(sums_[i] + sums_[right], least_of(sigma[i]));
-    cost[i] = cost_of(joint, residual[i], residual[right], sigma[i]);
+    cost[i] = cost_of(joint, residual[i], residual[right], sigma[i], sums_[i].n + sums_[right].n);
 }
 
 void UnevenSegments::fit(Array<Curve>& curves) const {

@@ -57,14 +57,16 @@ public:
 
     // The significance that a quadratic term must have where the noise is sigma.
     static double least_of(double sigma) { return curved_significance * sigma; }
-    // By how much the sum of squared residuals rises where one segment takes the place of two, in variances.
-    static double cost_of(double joint, double left, double right, double sigma) {
-        const double cost = (joint - left - right) / (sigma * sigma);
+    // By how much the sum of squared residuals rises where one segment of n samples takes the place of two, in
+    // variances; of equal costs, rounding included, that of fewer samples is lower.
+    static double cost_of(double joint, double left, double right, double sigma, double n) {
+        const double cost = (joint - left - right) / (sigma * sigma) + tie * n;
         return sigma > 0 && cost == cost ? cost : HUGE_VAL;
     }
 
 private:
     static constexpr double curved_significance = 5;  // standard deviations
+    static constexpr double tie = 1e-6;               // of a cost, for every sample
 };
 
 // Of samples one unit apart.
