@@ -18,7 +18,7 @@ namespace rangeedge {
 namespace {
 
 constexpr double lone_significance = 3;   // standard deviations that a candidate needs by itself, before its neighbours
-constexpr double jump_significance = 12;  // standard deviations that a jump needs by itself
+constexpr double jump_significance = 8;   // standard deviations that a jump needs by itself
 constexpr double jump_tolerances = 2;     // tolerances of splitting that a jump exceeds, the error of approximation
 
 template <class T>
@@ -40,38 +40,42 @@ private:
         for (std::ptrdiff_t i = 0; i + 1 < a.count; ++i) {
             if (a.segments[i + 1].first - a.segments[i].last - 1 > options_.max_gap) continue;
             const Position edge = adapted_position(line, a, i, options_.max_shift);         // paper, 4.2, Fig. 5
-            const Candidate candidate = measure(line, a.curves[i], a.curves[i + 1], edge);  // paper, 4.2, Fig. 4
+            const Candidate candidate = measure(line, a, i, edge);  // paper, 4.2, Fig. 4
             if (candidate.jump > 0 || candidate.crease > 0) candidates.push_back(candidate);
         }
     }
 
-    Candidate measure(const Line<T>& line, const Curve& f, const Curve& g, const Position& edge) const {
+    Candidate measure(const Line<T>& line, const Approximation& a, std::ptrdiff_t i, const Position& edge) const {
+        const Curve &f = a.curves[i], &g = a.curves[i + 1];
         const double x = edge.abscissa;
         const EdgeSide f1 = options_.endpoint ? from_endpoint(line, f, edge.before, x) : at_midpoint(line, f, x);
         const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_midpoint(line, g, x);
         double jump = edge.intersects ? 0 : jump_strength(line, f1, f2);
         double crease = crease_strength(f1, f2);
 
-        const double sigma = (line.sigma_at(edge.before) + line.sigma_at(edge.after)) / 2;
+        const SideDeviation d1 = deviation_of(line, f1, edge.before, a.segments[i].size());
+        const SideDeviation d2 = deviation_of(line, f2, edge.after, a.segments[i + 1].size());
         const double difference = std::abs(f1.ordinate - f2.ordinate);
-        double of_jump = difference / jump_deviation(f1, f2, sigma);
-        double of_crease = crease / crease_deviation(f1, f2, sigma);
+        const double of_jump = difference / jump_deviation(d1.value, d2.value);
+        const double of_crease = crease / crease_deviation(f1, d1.slope, f2, d2.slope);
+        double shared_jump = difference / jump_deviation(d1.shared_value, d2.shared_value);
+        double shared_crease = crease / crease_deviation(f1, d1.shared_slope, f2, d2.shared_slope);
         const double least = std::min(lone_significance, options_.min_significance);
-        if (!std::isfinite(jump) || !(of_jump >= least)) jump = of_jump = 0;
-        if (!std::isfinite(crease) || !(of_crease >= least)) crease = of_crease = 0;
+        if (!std::isfinite(jump) || !(of_jump >= least)) jump = shared_jump = 0;
+        if (!std::isfinite(crease) || !(of_crease >= least)) crease = shared_crease = 0;
 
         Candidate c{};
         c.jump = static_cast<float>(std::min(jump, static_cast<double>(std::numeric_limits<float>::max())));
         c.crease = static_cast<float>(crease);
-        const double significance = jump > 0 ? std::max(of_jump, of_crease) : of_crease;
+        const double significance = jump > 0 ? std::max(shared_jump, shared_crease) : shared_crease;
         c.significance = std::min(static_cast<float>(significance), endless);
         const double tolerance = std::max(line.tolerance_at(edge.before), line.tolerance_at(edge.after));
         if (jump > 0 && difference > jump_tolerances * tolerance && of_jump > jump_significance)
             c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
         if (crease > 0) c.kind |= is_convex(f1, f2) ? convex_bit : concave_bit;
         locate(c, line, edge);
-        c.sides[0] = side(line, f1);
-        c.sides[1] = side(line, f2);
+        c.sides[0] = side(line, f1, d1);
+        c.sides[1] = side(line, f2, d2);
         return c;
     }
 
@@ -88,9 +92,10 @@ private:
         c.plane_position[1] = static_cast<float>(w * d[1] + line.offset * d[0]);
     }
 
-    static Side side(const Line<T>& line, const EdgeSide& f) {
+    static Side side(const Line<T>& line, const EdgeSide& f, const SideDeviation& d) {
+        const double deviation = d.slope * line.per_step;
         return {static_cast<float>(f.ordinate), static_cast<float>(f.slope * line.per_step),
-                std::min(static_cast<float>(f.slope_variance * line.per_step * line.per_step), endless)};
+                std::min(static_cast<float>(deviation * deviation), endless)};
     }
 
     const ScanLineOptions& options_;

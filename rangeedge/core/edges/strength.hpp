@@ -34,6 +34,22 @@ struct EdgeSide {
     double angle_per_slope;
 };
 
+// The standard deviations of the value and the slope that a curve has by the noise, of one line and of neighbouring
+// lines together.
+struct SideDeviation {
+    double value, slope, shared_value, shared_slope;
+};
+
+// Of a fit to n samples, beside sample k.
+template <class T>
+SideDeviation deviation_of(const Line<T>& line, const EdgeSide& f, int k, int n) {
+    const FitNoise& noise = *line.noise;
+    const double sigma = line.sigma_of_fit_at(k, n);
+    const double value = sigma * std::sqrt(f.value_variance), slope = sigma * std::sqrt(f.slope_variance);
+    return {noise.value[n] * value, noise.slope[n] * slope, noise.shared_value[n] * value,
+            noise.shared_slope[n] * slope};
+}
+
 // First form: the curve at the position x of the edge.
 template <class T>
 EdgeSide at_midpoint(const Line<T>& line, const Curve& f, double x) {
@@ -69,13 +85,10 @@ inline double crease_strength(const EdgeSide& f1, const EdgeSide& f2) {
 // f1' > f2': on a grid, with the tangents (1, -f1') and (1, -f2'), their cross product is f1' - f2'.
 inline bool is_convex(const EdgeSide& f1, const EdgeSide& f2) { return cross(f1.tangent, f2.tangent) > 0; }
 
-// The standard deviations of f1(x) - f2(x), an ordinate, and of the crease, for samples of deviation sigma.
-inline double jump_deviation(const EdgeSide& f1, const EdgeSide& f2, double sigma) {
-    return sigma * std::sqrt(f1.value_variance + f2.value_variance);
-}
-inline double crease_deviation(const EdgeSide& f1, const EdgeSide& f2, double sigma) {
-    const double a1 = f1.angle_per_slope, a2 = f2.angle_per_slope;
-    return degrees_per_radian * sigma * std::sqrt(a1 * a1 * f1.slope_variance + a2 * a2 * f2.slope_variance);
+// The standard deviations of f1(x) - f2(x), an ordinate, and of the crease in degrees, by those of either side.
+inline double jump_deviation(double value1, double value2) { return std::hypot(value1, value2); }
+inline double crease_deviation(const EdgeSide& f1, double slope1, const EdgeSide& f2, double slope2) {
+    return degrees_per_radian * std::hypot(f1.angle_per_slope * slope1, f2.angle_per_slope * slope2);
 }
 
 }  // namespace rangeedge

@@ -36,9 +36,6 @@
 
 namespace rangeedge {
 
-enum Direction : std::uint8_t { rows_bit = 1, cols_bit = 2, diag45_bit = 4, diag135_bit = 8 };
-constexpr Direction all_directions[] = {rows_bit, cols_bit, diag45_bit, diag135_bit};
-
 // The pixels of one scan line: sample k lies at pixel (col + k dcol, row + k drow).
 struct Path {
     int col, row, dcol, drow, size;
@@ -62,6 +59,7 @@ inline double dot(const Tangent& a, const Tangent& b) { return a.s * b.s + a.r *
 template <class T>
 struct Line {
     const Frame<T>* frame = nullptr;
+    const FitNoise* noise = nullptr;  // of fits along the line
     Path path{};
     const T* y = nullptr;      // ordinates; `padding` more samples than the path has may be read
     const T* x = nullptr;      // null where samples are one unit apart
@@ -75,7 +73,10 @@ struct Line {
     double ordinate(int k) const { return static_cast<double>(y[k]); }
     double depth(double ordinate) const { return frame->projective ? 1 / ordinate : -ordinate; }
     std::int64_t pixel(int k) const { return path.pixel(k, frame->cols); }
-    double sigma_at(int k) const { return frame->noise.correlated_sigma(ordinate(k), pixel(k), frame->projective); }
+    // The deviation of sample k by itself, that of waves there, and the one that a fit to n samples counts with.
+    double sigma_at(int k) const { return frame->noise.sigma(ordinate(k), pixel(k), frame->projective); }
+    double waves_at(int k) const { return frame->noise.waves_at(ordinate(k), pixel(k), frame->projective); }
+    double sigma_of_fit_at(int k, int n) const { return sigma_of_fit(sigma_at(k), waves_at(k), n); }
     double tolerance_at(int k) const { return scale ? 1 / static_cast<double>(scale[k]) : tolerance; }
 
     // Of a curve that has this value and slope, by the abscissa, at an abscissa.

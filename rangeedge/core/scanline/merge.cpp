@@ -23,8 +23,8 @@ void Merger<T, List>::merge() {
         for (const int i : chosen_) {
             const int right = next(i);
             segment(i).last = segment(right).last;
-            sigma(i) = sigma(right);
-            set_sums(i, list_.sums(i) + list_.sums(right), sigma_of(i));
+            list_.sigma[i] = list_.sigma[right], list_.waves[i] = list_.waves[right];
+            set_sums(i, list_.sums(i) + list_.sums(right));
             remove(right);
         }
         cuts_.clear();
@@ -70,7 +70,7 @@ void Merger<T, List>::remove_bridges(Array<Curve>& curves) {
 template <class T, class List>
 bool Merger<T, List>::remove_if_bridge(int i, Array<Curve>& curves) {
     const int before = previous(i), after = next(i);
-    if (!(sigma(before) > 0 && sigma(i) > 0)) return false;  // not adjacent
+    if (!(list_.sigma[before] > 0 && list_.sigma[i] > 0)) return false;  // not adjacent
     const Segment s = segment(i);
     const Line<T>& line = line_of(i);
     const double begin = line.abscissa(s.first - 1), end = line.abscissa(s.last + 1);
@@ -83,23 +83,32 @@ bool Merger<T, List>::remove_if_bridge(int i, Array<Curve>& curves) {
     auto left = list_.sums(before), right = list_.sums(after);
     if (cut >= s.first) left = left + List::sums_over(line, {s.first, cut});
     if (cut < s.last) right = List::sums_over(line, {cut + 1, s.last}) + right;
-    const double deviation = sigma_of(i), least = SegmentList::least_of(deviation);
-    const double rise = residual_squares(left, least) + residual_squares(right, least) -
+    const double deviation = list_.noise().join[s.size()] * line.sigma_of_fit_at(s.reference(), s.size());
+    const double rise = residual_squares(left, least_of(i, left)) + residual_squares(right, least_of(i, right)) -
                         (residual(before) + residual(i) + residual(after));
     if (!(rise < bridge_factor * bridge_factor * limit_ * deviation * deviation)) return false;
     segment(before).last = cut;
     segment(after).first = cut + 1;
-    set_sums(before, left, deviation);
-    set_sums(after, right, deviation);
+    set_sums(before, left);
+    set_sums(after, right);
     remove(i);
     curves[before] = list_.curve(before), curves[after] = list_.curve(after);
     return true;
 }
 
+// The significance of a quadratic term of these sums, where the noise is that of a segment.
 template <class T, class List>
 template <class Sums>
-void Merger<T, List>::set_sums(int i, const Sums& sums, double sigma) {
-    list_.least[i] = SegmentList::least_of(sigma);
+double Merger<T, List>::least_of(int i, const Sums& sums) {
+    const Line<T>& line = line_of(i);
+    const int k = segment(i).reference();
+    return least_quadratic(line.sigma_at(k), line.waves_at(k), static_cast<int>(sums.n), line.noise->slope);
+}
+
+template <class T, class List>
+template <class Sums>
+void Merger<T, List>::set_sums(int i, const Sums& sums) {
+    list_.least[i] = least_of(i, sums);
     list_.set_sums(i, sums);
     residual(i) = residual_squares(sums, list_.least[i]);
 }

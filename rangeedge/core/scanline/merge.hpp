@@ -42,15 +42,15 @@ private:
     int& next(int i) { return list_.links[i].next; }
     bool& chosen(int i) { return list_.links[i].chosen; }
     Segment& segment(int i) { return list_.links[i].segment; }
-    double& sigma(int i) { return list_.sigma[i]; }
     double& residual(int i) { return list_.residual[i]; }
     double& cost(int i) { return list_.cost[i]; }
     const Line<T>& line_of(int i) { return lines_[static_cast<std::size_t>(list_.links[i].line)]; }
-    double sigma_of(int i) { return line_of(i).sigma_at(segment(i).reference()); }
 
     void choose();
     template <class Sums>
-    void set_sums(int i, const Sums& sums, double sigma);
+    double least_of(int i, const Sums& sums);
+    template <class Sums>
+    void set_sums(int i, const Sums& sums);
     void remove(int i);
     bool remove_if_bridge(int i, Array<Curve>& curves);
 

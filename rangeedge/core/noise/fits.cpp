@@ -1,0 +1,290 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "noise/fits.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "base/array.hpp"
+#include "base/parallel.hpp"
+#include "noise/least_squares.hpp"
+#include "noise/trimmed.hpp"
+
+namespace rangeedge {
+namespace {
+
+constexpr int neighbours = 5;       // scan lines whose means are looked at
+constexpr int most_groups = 12;     // of such neighbours, along rows, and along columns
+constexpr int positions = 80;       // of windows on a scan line, at the most, and
+constexpr int least_step = 8;       // samples from one to the next, at the least
+constexpr int measured_levels = 4;  // n = 4, 8, 16, 32
+constexpr int wave_level = 2;       // n = 16, which tells the waves
+constexpr int longest = 64;         // samples of a window whose residuals are looked at
+constexpr std::size_t least_windows = 40;  // that tell a deviation
+constexpr std::size_t depth_bins = 6;
+constexpr double most_growth = 1.41;       // of a factor from n to 2 n, beyond what is measured
+constexpr double least_factor = 0.5;       // errors that cancel each other are not relied on
+constexpr double residual_factor = 1.25;   // for what the curves of splitting, through three samples, are off themselves
+constexpr double most_residual = 12;
+
+double m2(double n) { return n * (n * n - 1) / 12; }
+
+// Sums over the first samples of a scan line, from which those over any window follow. Ordinates are counted from the
+// first one with data, places from the middle of the line.
+class LineSums {
+public:
+    // Of `size` samples, `step` apart.
+    template <class T>
+    void read(const T* y, int size, std::ptrdiff_t step) {
+        sums_.resize(size + 1);
+        middle_ = (size - 1) / 2.0;
+        base_ = 0;
+        for (int k = 0; k < size; ++k)
+            if (std::isfinite(y[k * step])) {
+                base_ = static_cast<double>(y[k * step]);
+                break;
+            }
+        Sums sum{};
+        double last = 0;
+        for (int k = 0; k < size; ++k) {
+            sums_[k] = sum;
+            const auto value = static_cast<double>(y[k * step]);
+            const bool valid = std::isfinite(value);
+            const double h = valid ? value - base_ : 0, t = k - middle_;
+            sum.h += h, sum.ht += h * t, sum.htt += h * t * t, sum.hh += h * h;
+            sum.invalid += !valid;
+            sum.changes += h != last;
+            last = h;
+        }
+        sums_[size] = sum;
+    }
+
+    // A straight line fitted to the n samples from k.
+    struct Fit {
+        double mean, slope;
+    };
+    Fit fit(int k, int n) const {
+        const Window w = window(k, n);
+        return {base_ + w.h / n, w.ht / m2(n)};
+    }
+    // Sum of squared residuals of the quadratic fitted to them.
+    double residual_squares(int k, int n) const {
+        const Window w = window(k, n);
+        const double beta = (n * n - 1) / 12.0, norm2 = m2(n) * (n * n - 4.0) / 15, y2 = w.htt - beta * w.h;
+        return std::max(0.0, w.hh - w.h * w.h / n - w.ht * w.ht / m2(n) - y2 * y2 / norm2);
+    }
+    // Whether all of them have data, and not all the same value.
+    bool tells(int k, int n) const {
+        return sums_[k + n].invalid == sums_[k].invalid && sums_[k + n].changes > sums_[k + 1].changes;
+    }
+
+private:
+    struct Sums {
+        double h, ht, htt, hh;
+        int invalid, changes;
+    };
+    // Sums over a window, with t counted from its middle.
+    struct Window {
+        double h, ht, htt, hh;
+    };
+    Window window(int k, int n) const {
+        const Sums &a = sums_[k], &b = sums_[k + n];
+        const double shift = k + (n - 1) / 2.0 - middle_, h = b.h - a.h, ht = b.ht - a.ht - shift * h;
+        return {h, ht, b.htt - a.htt - 2 * shift * (b.ht - a.ht) + shift * shift * h, b.hh - a.hh};
+    }
+
+    Array<Sums> sums_;
+    double middle_ = 0, base_ = 0;
+};
+
+// D and G of two adjacent windows, over what white noise of unit deviation gives them, and the ordinate there.
+struct Step {
+    double slope, gap, ordinate;
+};
+
+// What windows of one length show.
+struct Steps {
+    std::vector<Step> single, shared;
+};
+
+// All windows along one direction.
+struct DirectionSteps {
+    Steps levels[measured_levels];
+    std::vector<Step> residuals;  // of long windows: the deviation as `gap`
+};
+
+Step step_between(const LineSums& line, int k, int n) {
+    const LineSums::Fit f = line.fit(k, n), g = line.fit(k + n, n);
+    const double slope = g.slope - f.slope, gap = g.mean - f.mean - (f.slope + g.slope) * n / 2;
+    return {slope / std::sqrt(2 / m2(n)), gap / std::sqrt(2 * (1.0 / n + n * n / (4 * m2(n)))), (f.mean + g.mean) / 2};
+}
+
+// Calls visit(k) for places of windows of n samples in a line, the same ones whichever end it begins at.
+template <class Visit>
+void for_each_window(int size, int n, Visit&& visit) {
+    const int last = size - n;
+    if (last < 0) return;
+    const int step = std::max({least_step, n / 4, (last + positions - 1) / positions});
+    for (int k = 0; 2 * k <= last; k += step) {
+        visit(k);
+        if (2 * k < last) visit(last - k);
+    }
+}
+
+// `lines` scan lines of `size` samples; `line_step` and `sample_step` lead from one to the next.
+template <class T>
+DirectionSteps steps_along(const T* ordinate, int lines, int size, std::ptrdiff_t line_step,
+                           std::ptrdiff_t sample_step) {
+    DirectionSteps found;
+    const int groups = std::min(most_groups, lines / neighbours);
+    LineSums sums[neighbours];
+    for (int group = 0; group < groups; ++group) {
+        // Evenly spaced, and the same ones from either side.
+        const int mirrored = groups - 1 - group, room = lines - neighbours;
+        const auto place = [&](int i) { return static_cast<int>((2LL * i + 1) * room / (2LL * groups)); };
+        const int first = group <= mirrored ? place(group) : room - place(mirrored);
+        for (int i = 0; i < neighbours; ++i)
+            sums[i].read(ordinate + (first + i) * line_step, size, sample_step);
+        for (int level = 0; level < measured_levels; ++level) {
+            const int n = 4 << level;
+            Steps& steps = found.levels[level];
+            for_each_window(size, 2 * n, [&](int k) {
+                Step mean{};
+                int told = 0;
+                for (const LineSums& line : sums) {
+                    if (!line.tells(k, 2 * n)) continue;
+                    const Step s = step_between(line, k, n);
+                    steps.single.push_back(s);
+                    mean.slope += s.slope, mean.gap += s.gap, mean.ordinate += s.ordinate;
+                    ++told;
+                }
+                if (told < neighbours) return;
+                const double worth = 1 / std::sqrt(static_cast<double>(neighbours));
+                steps.shared.push_back({worth * mean.slope, worth * mean.gap, mean.ordinate / neighbours});
+            });
+        }
+        const int n = std::min(longest, size / 2);
+        if (n <= 8) continue;
+        for (const LineSums& line : sums)
+            for_each_window(size, n, [&](int k) {
+                if (!line.tells(k, n)) return;
+                const double ordinate_there = line.fit(k, n).mean;
+                found.residuals.push_back({0, std::sqrt(line.residual_squares(k, n) / (n - 3)), ordinate_there});
+            });
+    }
+    return found;
+}
+
+// How the deviation of |D| for n = 16 grows with depth, in units of `single` on the whole.
+Deviation waves_of(const DirectionSteps (&found)[2], bool projective, const Deviation& single) {
+    if (!projective) return single;
+    std::vector<Step> steps;
+    for (const DirectionSteps& f : found) {
+        const auto& own = f.levels[wave_level].single;
+        steps.insert(steps.end(), own.begin(), own.end());
+    }
+    if (steps.size() < depth_bins * least_windows) return single;
+    std::sort(steps.begin(), steps.end(), [](const Step& a, const Step& b) { return a.ordinate < b.ordinate; });
+    std::vector<double> depths, deviations;
+    std::vector<float> sizes;
+    for (std::size_t bin = 0; bin < depth_bins; ++bin) {
+        const std::size_t begin = bin * steps.size() / depth_bins, end = (bin + 1) * steps.size() / depth_bins;
+        sizes.clear();
+        for (std::size_t i = begin; i < end; ++i) sizes.push_back(static_cast<float>(std::abs(steps[i].slope)));
+        const double z = 1 / steps[(begin + end) / 2].ordinate, deviation = median_deviation(sizes) * z * z;
+        if (!(deviation > 0) || !std::isfinite(deviation)) continue;
+        depths.push_back(z);
+        deviations.push_back(deviation);
+    }
+    const Deviation shape = fitted_deviation(depths, deviations, {0, 2, 3});
+    sizes.clear();
+    for (const Step& s : steps) {
+        const double ratio = single.of_length(1 / s.ordinate) / shape.of_length(1 / s.ordinate);
+        if (std::isfinite(ratio)) sizes.push_back(static_cast<float>(ratio));
+    }
+    if (sizes.empty()) return single;
+    const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+    std::nth_element(sizes.begin(), middle, sizes.end());
+    return shape.times(static_cast<double>(*middle));
+}
+
+// Deviations of steps over the noise at their ordinates.
+class Measure {
+public:
+    Measure(const Deviation& single, const Deviation& waves, bool projective)
+        : single_(single), waves_(waves), projective_(projective) {}
+
+    // Of the slopes or the gaps of fits to n samples; NaN where too few tell it.
+    double factor(const std::vector<Step>& steps, double Step::* number, int n) {
+        sizes_.clear();
+        for (const Step& s : steps) {
+            const double y = std::abs(s.ordinate);
+            const double sigma = sigma_of_fit(single_.of_ordinate(y, projective_), waves_.of_ordinate(y, projective_), n);
+            const double size = std::abs(s.*number) / sigma;
+            if (std::isfinite(size)) sizes_.push_back(static_cast<float>(size));
+        }
+        return sizes_.size() < least_windows ? std::nan("") : median_deviation(sizes_);
+    }
+
+private:
+    Deviation single_, waves_;
+    bool projective_;
+    std::vector<float> sizes_;
+};
+
+// Factors at all levels from those that are measured, the rest by how the last ones grow.
+void write_factors(const double* measured, const double* at_least, double* factors) {
+    double last = 1, before = 1;
+    for (int level = 0; level < FitFactors::levels; ++level) {
+        double factor = level < measured_levels ? measured[level] : std::nan("");
+        if (!(factor == factor)) factor = last * std::max(1.0, std::min(most_growth, last / before));
+        factor = std::max(factor, level == 0 ? 1.0 : least_factor);
+        if (at_least) factor = std::max(factor, at_least[level]);
+        factors[level] = factor;
+        before = last, last = factor;
+    }
+}
+
+void write_fit_noise(const DirectionSteps& found, Measure& measure, double* numbers) {
+    double measured[4][measured_levels];
+    for (int level = 0; level < measured_levels; ++level) {
+        const Steps& steps = found.levels[level];
+        const int n = 4 << level;
+        measured[0][level] = measure.factor(steps.single, &Step::slope, n);
+        measured[1][level] = measure.factor(steps.single, &Step::gap, n);
+        measured[2][level] = measure.factor(steps.shared, &Step::slope, n);
+        measured[3][level] = measure.factor(steps.shared, &Step::gap, n);
+    }
+    for (int kind = 0; kind < 4; ++kind) {
+        double* own = numbers + kind * FitFactors::levels;
+        write_factors(measured[kind], kind < 2 ? nullptr : own - 2 * FitFactors::levels, own);
+    }
+    const double residual = residual_factor * measure.factor(found.residuals, &Step::gap, longest);
+    numbers[4 * FitFactors::levels] = residual >= 1 ? std::min(residual, most_residual) : 1;
+}
+
+}  // namespace
+
+template <class T>
+FitNoiseEstimate fit_noise(const T* ordinate, int rows, int cols, bool projective, const Deviation& single,
+                           int threads) {
+    DirectionSteps found[2];
+    Team team(std::min(threads, 2));
+    parallel_for(2, team, [&](int begin, int end, int) {
+        for (int i = begin; i < end; ++i)
+            found[i] = i == 0 ? steps_along(ordinate, rows, cols, cols, 1) : steps_along(ordinate, cols, rows, 1, cols);
+    });
+    FitNoiseEstimate estimate{};
+    estimate.waves = waves_of(found, projective, single);
+    parallel_for(2, team, [&](int begin, int end, int) {
+        Measure measure(single, estimate.waves, projective);
+        for (int i = begin; i < end; ++i) write_fit_noise(found[i], measure, i == 0 ? estimate.rows : estimate.cols);
+    });
+    return estimate;
+}
+
+template FitNoiseEstimate fit_noise(const float*, int, int, bool, const Deviation&, int);
+template FitNoiseEstimate fit_noise(const double*, int, int, bool, const Deviation&, int);
+
+}  // namespace rangeedge
