@@ -3,21 +3,11 @@
 from __future__ import annotations
 
 from importlib import import_module
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-try:
-    from . import _core  # noqa: F401
-except ImportError as reason:
-    if not (Path(__file__).parent / "core").exists():
-        raise
-    raise ImportError(
-        "this is the source folder of rangeedge, where nothing is compiled: start Python in another folder to use the "
-        "installed package, or install this one by `pip install -e .`"
-    ) from reason
-
-from ._args import error
-from ._constants import (
+from ._check import error
+from .closure import closeContours
+from .constants import (
     CREASE_MAX,
     CREASE_NORMAL,
     DIR_ALL,
@@ -41,8 +31,7 @@ from ._constants import (
     THIN_LEE,
     THIN_SKELETON,
 )
-from .closure import closeContours
-from .detector import ScanLineDetector, createScanLineDetector, detectEdges
+from .detector import ScanLineDetector, createScanLineDetector, detectEdges, detectEdgesWithStrength
 from .distance import (
     distanceTransform,
     distanceTransformWithLabels,
@@ -50,9 +39,11 @@ from .distance import (
     salienceDistanceTransformWithLabels,
 )
 from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
-from .edges import EdgeStrength, ScanLineParams, edgePoints, edgeStrength, splitScanLine
+from .edges import EdgeStrength, edgePoints, edgeStrength, kindNames, splitScanLine
 from .io import RangeImage, imreadRange, imwriteRange
-from .noise import NoiseModel, estimateNoise
+from .noise import estimateNoise
+from .noise_model import NoiseModel
+from .options import ScanLineParams
 from .regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
 from .seeds import extractSeeds, extractSeedsWithStats
 from .selection import overallStrength, selectEdges, strengthImage
@@ -79,11 +70,13 @@ __all__ = [  # noqa: RUF022
     "EdgeStrength",
     "edgeStrength",
     "edgePoints",
+    "kindNames",
     "strengthImage",
     "overallStrength",
     "selectEdges",
     "thinEdges",
     "detectEdges",
+    "detectEdgesWithStrength",
     "ScanLineDetector",
     "createScanLineDetector",
     "closeContours",
@@ -136,4 +129,5 @@ if not TYPE_CHECKING:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_SUBMODULES})
+    special = [name for name in globals() if name.startswith("__") and name.endswith("__")]
+    return sorted([*special, *__all__, *_SUBMODULES])

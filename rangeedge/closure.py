@@ -2,37 +2,34 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from . import _core
-from ._args import deliver, image8, integer, number
-from .geometry import range_frame
-from .noise import kernel_noise
+from ._check import deliver, image8
+from .noise import measured_frame
+from .options import CLOSING, Closing, ScanLineParams, parsed, takes
 from .surfaces import surface_map
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
+    from ._typed import ClosingOptions
+
+
+@takes(CLOSING)
 def closeContours(
     edges: np.ndarray,
     src: np.ndarray,
     *,
-    K: Any = None,
-    pixelSize: Any = None,
-    heightMap: bool = False,
-    depthFactor: float = 1000.0,
     mask: np.ndarray | None = None,
-    noise: Any = None,
-    tolerance: float = 3.0,
-    share: float = 0.9,
-    maxGap: int = 40,
-    minArea: int = 50,
     dst: np.ndarray | None = None,
+    **options: Unpack[ClosingOptions],
 ) -> np.ndarray:
     """Close gaps between edges where what they enclose is no single surface.
 
-    closeContours(edges, src, *[, K[, pixelSize[, heightMap[, depthFactor[, mask[, noise[, tolerance[, share[, maxGap
-    [, minArea[, dst]]]]]]]]]]]) -> dst
+    closeContours(edges, src, *[, mask[, dst[, K[, ...]]]]) -> dst
 
     The 4-connected components of what is no edge are hypotheses of regions. One is verified where a plane, or a
     quadratic that two planes do not beat, leaves at most ``1 - share`` of its pixels farther off than `tolerance`
@@ -44,18 +41,11 @@ def closeContours(
     ----------
     edges : (H, W) CV_8U or bool
         Edge map, non-zero on edges.
-    src, K, pixelSize, heightMap, depthFactor, mask
-        Range image and its geometry, as for `edgeStrength`. Pixels without data bound regions as edges do.
-    noise : NoiseModel, float or (H, W) array, optional
-        Noise of the range image; estimated from it by default.
-    tolerance : float
-        How far a pixel may lie off its surface, in standard deviations.
-    share : float
-        Share of the pixels of a surface that must lie within `tolerance`, in (0, 1].
-    maxGap : int
-        Widest gap to close, in pixels: edges are dilated by at most half of it.
-    minArea : int
-        Components of fewer pixels are no hypotheses; no edge is drawn for them.
+    src : ndarray
+        Range image, as for `edgeStrength`. Pixels without data bound regions as edges do.
+    mask : ndarray of shape (H, W), 8-bit or bool, optional
+        Non-zero where pixels are used.
+    {options}
     dst : (H, W) CV_8U, optional
         Receives the result where shape and type fit.
 
@@ -78,6 +68,9 @@ def closeContours(
     --------
     Two planes, and an edge between them with a gap:
 
+    >>> import cv2
+    >>> import numpy as np
+    >>> from rangeedge import closeContours
     >>> x = np.arange(60)
     >>> depth = np.tile(np.abs(x - 30) / 20.0, (60, 1))
     >>> edges = np.zeros((60, 60), np.uint8)
@@ -86,25 +79,20 @@ def closeContours(
     >>> [cv2.connectedComponents(255 - e, connectivity=4)[0] - 1 for e in (edges, closed)]
     [1, 2]
     """
-    func = "closeContours"
-    frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    edges = image8(func, "edges", edges, frame.shape)
-    tolerance = number(func, "tolerance", tolerance, 0, above=True)
-    share = number(func, "share", share, 0, 1, above=True)
-    maxGap = integer(func, "maxGap", maxGap, 0)
-    minArea = integer(func, "minArea", minArea, 1)
-    deviations = kernel_noise(func, noise, frame)
-    options = _core.ClosureOptions(
-        correlation=deviations.correlation,
-        tolerance=tolerance,
-        share=share,
-        dilations=(maxGap + 1) // 2,
-        min_area=minArea,
+    params, closing = parsed(options, ScanLineParams, Closing)
+    frame = measured_frame(src, params, mask)
+    edges = image8("edges", edges, frame.shape)
+    kernel_options = _core.ClosureOptions(
+        correlation=frame.correlation,
+        tolerance=closing.tolerance,
+        share=closing.share,
+        dilations=(closing.maxGap + 1) // 2,
+        min_area=closing.minArea,
     )
     regions = np.empty(frame.shape, np.int32)
-    _core.verified_regions(surface_map(frame, deviations, edges), options, regions)
+    _core.verified_regions(surface_map(frame, edges), kernel_options, regions)
     closed = ((edges != 0) | _meetings(regions)).view(np.uint8) * np.uint8(255)
-    return deliver(func, "dst", closed, dst)
+    return deliver("dst", closed, dst)
 
 
 def _meetings(regions: np.ndarray) -> np.ndarray:

@@ -8,13 +8,14 @@ import cv2
 import numpy as np
 
 from . import _core
-from ._args import array, deliver, described, fail, flag, image8, image32f, number
-from ._constants import SALIENCE_ADDITIVE, SALIENCE_MULTIPLICATIVE
+from ._check import array, deliver, described, fail, flag, image8, image32f, number, public
+from .constants import SALIENCE_ADDITIVE, SALIENCE_MULTIPLICATIVE
 
 _METHODS = {"SALIENCE_MULTIPLICATIVE": SALIENCE_MULTIPLICATIVE, "SALIENCE_ADDITIVE": SALIENCE_ADDITIVE}
 _WORTH_THREADS = 1 << 15  # pixels; fewer take less time than starting a thread
 
 
+@public
 def distanceTransform(edges: np.ndarray, dst: np.ndarray | None = None) -> np.ndarray:
     """Exact Euclidean distance of every pixel to the nearest edge pixel.
 
@@ -47,16 +48,19 @@ def distanceTransform(edges: np.ndarray, dst: np.ndarray | None = None) -> np.nd
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import distanceTransform
     >>> edges = np.array([[255, 0, 0, 0]], np.uint8)
     >>> distanceTransform(edges)
     array([[0., 1., 2., 3.]], dtype=float32)
     """
-    edges = _binary("distanceTransform", edges)
+    edges = _binary(edges)
     distance = np.empty(edges.shape, np.float32)
     _core.distance_transform(edges, distance, None, _threads(edges))
-    return deliver("distanceTransform", "dst", distance, dst)
+    return deliver("dst", distance, dst)
 
 
+@public
 def distanceTransformWithLabels(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Exact Euclidean distance to the nearest edge pixel, and which pixel that is.
 
@@ -84,16 +88,19 @@ def distanceTransformWithLabels(edges: np.ndarray) -> tuple[np.ndarray, np.ndarr
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import distanceTransformWithLabels
     >>> edges = np.array([[255, 0, 0, 0, 255]], np.uint8)
     >>> distanceTransformWithLabels(edges)[1]
     array([[0, 0, 0, 4, 4]], dtype=int32)
     """
-    edges = _binary("distanceTransformWithLabels", edges)
+    edges = _binary(edges)
     distance, labels = np.empty(edges.shape, np.float32), np.empty(edges.shape, np.int32)
     _core.distance_transform(edges, distance, labels, _threads(edges))
     return distance, labels
 
 
+@public
 def salienceDistanceTransform(
     salience: np.ndarray,
     method: int = SALIENCE_MULTIPLICATIVE,
@@ -148,14 +155,17 @@ def salienceDistanceTransform(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import salienceDistanceTransform
     >>> salience = np.array([[51, 0, 0, 0, 0, 0, 0, 255]], np.uint8)
     >>> salienceDistanceTransform(salience)
     array([[0., 5., 5., 4., 3., 2., 1., 0.]], dtype=float32)
     """
-    distance, _ = _salience_transform("salienceDistanceTransform", salience, method, lambda_, with_labels=False)
-    return deliver("salienceDistanceTransform", "dst", distance, dst)
+    distance, _ = _salience_transform(salience, method, lambda_, with_labels=False)
+    return deliver("dst", distance, dst)
 
 
+@public
 def salienceDistanceTransformWithLabels(
     salience: np.ndarray, method: int = SALIENCE_MULTIPLICATIVE, *, lambda_: float = 10.0
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -185,19 +195,21 @@ def salienceDistanceTransformWithLabels(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import salienceDistanceTransformWithLabels
     >>> salience = np.array([[51, 0, 0, 0, 0, 0, 0, 255]], np.uint8)
     >>> salienceDistanceTransformWithLabels(salience)[1]
     array([[0, 0, 7, 7, 7, 7, 7, 7]], dtype=int32)
     """
-    return _salience_transform("salienceDistanceTransformWithLabels", salience, method, lambda_, with_labels=True)
+    return _salience_transform(salience, method, lambda_, with_labels=True)
 
 
 def _salience_transform(
-    func: str, salience: np.ndarray, method: int, lambda_: float, *, with_labels: bool
+    salience: np.ndarray, method: int, lambda_: float, *, with_labels: bool
 ) -> tuple[np.ndarray, np.ndarray | None]:
-    salience = _salience(func, salience)
-    method = flag(func, "method", method, _METHODS)
-    lambda_ = number(func, "lambda_", lambda_, 0.0, 1e6)
+    salience = _salience(salience)
+    method = flag("method", method, _METHODS)
+    lambda_ = number("lambda_", lambda_, 0.0, 1e6)
     distance = np.empty(salience.shape, np.float32)
     labels = np.empty(salience.shape, np.int32) if with_labels else None
     if method == SALIENCE_MULTIPLICATIVE:
@@ -207,31 +219,31 @@ def _salience_transform(
     return distance, labels
 
 
-def _binary(func: str, edges: np.ndarray) -> np.ndarray:
-    return image8(func, "edges", _indexable(func, "edges", edges))
+def _binary(edges: np.ndarray) -> np.ndarray:
+    return image8("edges", _indexable("edges", edges))
 
 
-def _salience(func: str, value: np.ndarray) -> np.ndarray:
+def _salience(value: np.ndarray) -> np.ndarray:
     """A salience map as C-contiguous uint8 or float32, its values checked."""
     expected = "a uint8, bool or float32 array of shape (H, W)"
-    value = array(func, "salience", _indexable(func, "salience", value), expected)
+    value = array("salience", _indexable("salience", value), expected)
     if value.dtype == np.bool_:
         return np.where(value, np.uint8(255), np.uint8(0))
     if value.dtype == np.uint8:
-        return image8(func, "salience", value)
+        return image8("salience", value)
     if value.dtype != np.float32:
-        raise fail(func, "salience", expected, described(value), cv2.Error.StsUnsupportedFormat)
+        raise fail("salience", expected, described(value), cv2.Error.StsUnsupportedFormat)
     low, high = value.min(), value.max()
     if not (low >= 0 and high <= 1):
-        raise fail(func, "salience", "in [0, 1] where it is float32", f"{low:g} to {high:g}", cv2.Error.StsOutOfRange)
-    return image32f(func, "salience", value)
+        raise fail("salience", "in [0, 1] where it is float32", f"{low:g} to {high:g}", cv2.Error.StsOutOfRange)
+    return image32f("salience", value)
 
 
-def _indexable(func: str, name: str, value: Any) -> Any:
+def _indexable(name: str, value: Any) -> Any:
     """`value`, unless it is an image whose pixels CV_32S labels cannot number or whose columns floats cannot."""
     if isinstance(value, np.ndarray) and (value.size >= 2**31 or max(value.shape, default=0) > 2**24):
         expected = "of fewer than 2^31 pixels and sides of at most 2^24"
-        raise fail(func, name, expected, described(value), cv2.Error.StsOutOfRange)
+        raise fail(name, expected, described(value), cv2.Error.StsOutOfRange)
     return value
 
 

@@ -10,9 +10,10 @@ from collections import defaultdict
 import cv2
 import numpy as np
 
-from . import _args
-from ._constants import EDGE_BOUNDARY, EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, EDGE_OCCLUDED
-from .geometry import range_frame
+from . import _check
+from .constants import EDGE_BOUNDARY, EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, EDGE_OCCLUDED
+from .frame import read_frame
+from .options import ScanLineParams
 from .selection import strengthImage
 
 _PLAIN = (255, 255, 255)  # an edge of no known kind
@@ -38,6 +39,7 @@ _FONT, _FONT_SCALE, _BAR = cv2.FONT_HERSHEY_SIMPLEX, 0.55, 28
 _PANEL_MIN, _PANEL_MAX = 320, 640  # longer side of a panel in pixels
 
 
+@_check.public
 def drawEdges(
     src: np.ndarray,
     edges: np.ndarray,
@@ -80,19 +82,20 @@ def drawEdges(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import drawEdges
     >>> depth, edges = np.ones((4, 6), np.float32), np.zeros((4, 6), np.uint8)
     >>> edges[:, 2] = 255
     >>> drawEdges(depth, edges)[0, 2]
     array([255, 255, 255], dtype=uint8)
     """
-    func = "drawEdges"
-    canvas = _backdrop(func, src, K, heightMap)
-    edges = _args.image8(func, "edges", edges, canvas.shape[:2])
-    kind = None if kind is None else _args.image8(func, "kind", kind, edges.shape)
+    canvas = _backdrop(src, K, heightMap)
+    edges = _check.image8("edges", edges, canvas.shape[:2])
+    kind = None if kind is None else _check.image8("kind", kind, edges.shape)
     _paint(canvas, _colour_index(edges != 0, kind))
-    return _args.deliver(func, "dst", canvas, dst)
+    return _check.deliver("dst", canvas, dst)
 
 
+@_check.public
 def drawRegions(
     labels: np.ndarray,
     src: np.ndarray | None = None,
@@ -133,26 +136,27 @@ def drawRegions(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import drawRegions
     >>> drawRegions(np.int32([[0, 1, 2, 1]]))[0]
     array([[  0,   0,   0],
            [238, 204, 136],
            [119, 102, 204],
            [238, 204, 136]], dtype=uint8)
     """
-    func = "drawRegions"
-    labels = _args.labels32s(func, "labels", labels)
-    alpha = _args.number(func, "alpha", alpha, 0, 1)
+    labels = _check.labels32s("labels", labels)
+    alpha = _check.number("alpha", alpha, 0, 1)
     if src is None:
         canvas, alpha = np.zeros((*labels.shape, 3), np.uint8), 1.0
     else:
-        canvas = _backdrop(func, src, K, heightMap, labels.shape)
+        canvas = _backdrop(src, K, heightMap, labels.shape)
     inside = labels > 0
     if inside.any():
         colours = _region_colours(labels, inside)
         canvas[inside] = np.rint(alpha * colours + (1 - alpha) * canvas[inside])
-    return _args.deliver(func, "dst", canvas, dst)
+    return _check.deliver("dst", canvas, dst)
 
 
+@_check.public
 def colorizeDistance(
     distance: np.ndarray, dst: np.ndarray | None = None, *, maxDistance: float | None = None, log: bool = False
 ) -> np.ndarray:
@@ -188,19 +192,20 @@ def colorizeDistance(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import colorizeDistance
     >>> colorizeDistance(np.float32([[0, 1, np.inf]]))[0]
     array([[  4,   0,   0],
            [164, 255, 252],
            [128, 128, 128]], dtype=uint8)
     """
-    func = "colorizeDistance"
-    distance = _distance(func, distance)
+    distance = _distance(distance)
     if maxDistance is not None:
-        maxDistance = _args.number(func, "maxDistance", maxDistance, 0, above=True)
-    log = _args.boolean(func, "log", log)
-    return _args.deliver(func, "dst", _distance_colours(distance, maxDistance, log), dst)
+        maxDistance = _check.number("maxDistance", maxDistance, 0, above=True)
+    log = _check.boolean("log", log)
+    return _check.deliver("dst", _distance_colours(distance, maxDistance, log), dst)
 
 
+@_check.public
 def drawOverview(
     src: np.ndarray,
     strength: tuple[np.ndarray, ...],
@@ -250,23 +255,23 @@ def drawOverview(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import drawOverview
     >>> depth, none = np.ones((48, 64), np.float32), np.zeros((48, 64), np.float32)
     >>> kind = np.zeros((48, 64), np.uint8)
     >>> drawOverview(depth, (none, none, kind, none), kind).dtype
     dtype('uint8')
     """
-    func = "drawOverview"
-    depth = range_frame(func, src, K, heightMap=heightMap).depth
-    jump, crease, kind = _strength(func, strength, depth.shape)
-    edges = _args.image8(func, "edges", edges, depth.shape) != 0
+    depth = read_frame(src, ScanLineParams(K=K, heightMap=heightMap)).depth
+    jump, crease, kind = _strength(strength, depth.shape)
+    edges = _check.image8("edges", edges, depth.shape) != 0
     if distance is not None:
-        distance = _distance(func, distance, depth.shape)
+        distance = _distance(distance, depth.shape)
     if title is not None and not isinstance(title, str):
-        raise _args.fail(func, "title", "a string or None", type(title).__name__)
+        raise _check.fail("title", "a string or None", type(title).__name__)
     if jumpCut is None:
         jumpCut = float(np.median(jump[jump > 0])) if jump.any() else 1.0
-    jumpCut = _args.number(func, "jumpCut", jumpCut, 0, above=True)
-    creaseCut = _args.number(func, "creaseCut", creaseCut, 0, above=True)
+    jumpCut = _check.number("jumpCut", jumpCut, 0, above=True)
+    creaseCut = _check.number("creaseCut", creaseCut, 0, above=True)
 
     size = _panel_size(depth.shape)
     relief = _resized(_relief(depth), size)
@@ -295,7 +300,7 @@ def region_overview(
     heightMap: bool = False,
 ) -> np.ndarray:
     """Range image, edges, seeds and regions in one labelled picture, after the manner of `drawOverview`."""
-    depth = range_frame("drawOverview", surface, heightMap=heightMap).depth
+    depth = read_frame(surface, ScanLineParams(heightMap=heightMap)).depth
     size = _panel_size(depth.shape)
     relief = _resized(_relief(depth), size)
     seeds, regions = (_resized(drawRegions(part, _subdued(_relief(depth)), 0.8), size) for part in (seeds, labels))
@@ -310,36 +315,34 @@ def region_overview(
 
 
 def _backdrop(
-    func: str, src: np.ndarray, K: np.ndarray | None, heightMap: bool, shape: tuple[int, int] | None = None
+    src: np.ndarray, K: np.ndarray | None, heightMap: bool, shape: tuple[int, int] | None = None
 ) -> np.ndarray:
     """A new picture to draw on: the one given, or the subdued relief of a range image."""
     if isinstance(src, np.ndarray) and src.dtype == np.uint8 and src.ndim == 3 and src.shape[2] == 3 and src.size:
         picture = src.copy()
     else:
-        picture = _subdued(_relief(range_frame(func, src, K, heightMap=heightMap).depth))
+        picture = _subdued(_relief(read_frame(src, ScanLineParams(K=K, heightMap=heightMap)).depth))
     if shape is not None and picture.shape[:2] != shape:
-        raise _args.fail(func, "src", f"of shape {shape}", _args.described(src), cv2.Error.StsUnmatchedSizes)
+        raise _check.fail("src", f"of shape {shape}", _check.described(src), cv2.Error.StsUnmatchedSizes)
     return picture
 
 
-def _distance(func: str, distance: np.ndarray, shape: tuple[int, int] | None = None) -> np.ndarray:
-    distance = _args.image32f(func, "distance", distance, shape)
+def _distance(distance: np.ndarray, shape: tuple[int, int] | None = None) -> np.ndarray:
+    distance = _check.image32f("distance", distance, shape)
     if not distance.min() >= 0:  # NaN fails the comparison too
-        raise _args.fail(func, "distance", ">= 0 everywhere", f"a least value of {distance.min():g}")
+        raise _check.fail("distance", ">= 0 everywhere", f"a least value of {distance.min():g}")
     return distance
 
 
-def _strength(func: str, strength: tuple[np.ndarray, ...], shape: tuple[int, int]) -> tuple[np.ndarray, ...]:
+def _strength(strength: tuple[np.ndarray, ...], shape: tuple[int, int]) -> tuple[np.ndarray, ...]:
     """Jump, crease and kind out of an EdgeStrength."""
     if not isinstance(strength, tuple) or len(strength) != 4:
-        raise _args.fail(
-            func, "strength", "an EdgeStrength (jump, crease, kind, significance)", type(strength).__name__
-        )
+        raise _check.fail("strength", "an EdgeStrength (jump, crease, kind, significance)", type(strength).__name__)
     jump, crease, kind, _ = strength
     return (
-        _args.strength32f(func, "strength.jump", jump, shape),
-        _args.strength32f(func, "strength.crease", crease, shape),
-        _args.image8(func, "strength.kind", kind, shape),
+        _check.strength32f("strength.jump", jump, shape),
+        _check.strength32f("strength.crease", crease, shape),
+        _check.image8("strength.kind", kind, shape),
     )
 
 

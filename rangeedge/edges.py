@@ -1,132 +1,34 @@
-"""Edge strengths, kinds and positions from scan line approximation (P§4)."""
+"""Edge strengths, kinds and positions from scan line approximation (paper, 4)."""
 
 from __future__ import annotations
 
-import difflib
-import functools
-import inspect
-from collections.abc import Callable
-from dataclasses import dataclass, fields
-from typing import Any, NamedTuple
+import re
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import _core
-from ._args import array, boolean, described, error, errors_of, fail, flag, integer, number
-from ._constants import (
-    CREASE_MAX,
-    CREASE_NORMAL,
-    DIR_ALL,
-    FIT_INTERP,
-    FIT_LSQ,
-    MEASURE_ENDPOINT,
-    MEASURE_MIDPOINT,
-)
-from .geometry import RangeFrame, range_frame
-from .noise import kernel_noise
+from ._check import array, described, fail, integer, number, public
+from .constants import EDGE_BOUNDARY, EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, EDGE_OCCLUDED, EDGE_OCCLUDING
+from .frame import Frame
+from .noise import measured_frame
+from .options import SCAN_LINES, Option, ScanLineParams, parsed, takes
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
-@dataclass(frozen=True)
-class ScanLineParams:
-    """Every parameter of the detector, with its default.
+    from ._typed import ScanLineOptions
 
-    ScanLineParams([eps[, epsFactor[, K[, ...]]]])
-
-    The functions that detect edges take each of these by keyword.
-
-    Parameters
-    ----------
-    eps : float or None
-        Splitting tolerance as a length, at the pixel's depth with a camera (P§4.1). None: `epsFactor` times the noise.
-    epsFactor : float
-        Splitting tolerance in standard deviations of the noise.
-    K : array_like of shape (3, 3) or None
-        Camera matrix; the values of `src` are then depths along the optical axis.
-    pixelSize : float or (float, float) or None
-        Spacing (dx, dy) of a regular grid in the unit of its values; None is 1.
-    heightMap : bool
-        Whether larger values are nearer to the viewer.
-    depthFactor : float
-        Divides integer values: 1000 makes metres of millimetres. Integer 0 is invalid.
-    noise : NoiseModel or float or ndarray of shape (H, W) or None
-        Standard deviation of the values as lengths; None estimates it from the image (`estimateNoise`).
-    directions : int
-        Scan lines to use: DIR_ROWS, DIR_COLS, DIR_DIAG45, DIR_DIAG135 combined by `|`, or DIR_ALL.
-    fit : int
-        FIT_LSQ, least squares over a segment, a line unless a quadratic is significant; or FIT_INTERP, the quadratic
-        through end points and midpoint. With FIT_INTERP cuts stay as they fall.
-    measure : int
-        MEASURE_MIDPOINT, strengths where the edge is; or MEASURE_ENDPOINT, extrapolated from either end point.
-    crease : int
-        CREASE_NORMAL, the angle between the surface normals, which the tangents of several scan lines give; or
-        CREASE_MAX, the largest directional angle (P§4.2).
-    maxShift : float
-        How far, in pixels, the adapted edge position may lie from the cut (P§4.2, Fig. 5); 0 keeps the cut.
-    maxGap : int
-        Widest gap of invalid pixels on a scan line whose two sides are compared: occlusion shadows.
-    mergeSignificance : float
-        Cuts are taken back where that raises the sum of squared residuals by less than its square, in variances of the
-        noise; a segment across an edge, or its rounding, is given to the surfaces beside it likewise. 0 keeps all.
-    minSignificance : float
-        Candidates are dropped whose significance, joined with that of their neighbours, is below this; 0 keeps all.
-
-    Raises
-    ------
-    rangeedge.error
-        If a value is out of range. `K`, `pixelSize` and `noise` are checked together with the image.
-
-    Examples
-    --------
-    >>> ScanLineParams().maxShift
-    4.0
-    >>> ScanLineParams.paper().fit == FIT_INTERP
-    True
-    """
-
-    eps: float | None = None
-    epsFactor: float = 3.5
-    K: Any = None
-    pixelSize: Any = None
-    heightMap: bool = False
-    depthFactor: float = 1000.0
-    noise: Any = None
-    directions: int = DIR_ALL
-    fit: int = FIT_LSQ
-    measure: int = MEASURE_MIDPOINT
-    crease: int = CREASE_NORMAL
-    maxShift: float = 4.0
-    maxGap: int = 8
-    mergeSignificance: float = 5.0
-    minSignificance: float = 12.0
-
-    def __post_init__(self) -> None:
-        func = "ScanLineParams"
-        if self.eps is not None:
-            number(func, "eps", self.eps, 0, above=True)
-        number(func, "epsFactor", self.epsFactor, 0, above=True)
-        number(func, "depthFactor", self.depthFactor, 0, above=True)
-        boolean(func, "heightMap", self.heightMap)
-        integer(func, "directions", self.directions, 1, DIR_ALL)
-        flag(func, "fit", self.fit, {"FIT_LSQ": FIT_LSQ, "FIT_INTERP": FIT_INTERP})
-        measures = {"MEASURE_MIDPOINT": MEASURE_MIDPOINT, "MEASURE_ENDPOINT": MEASURE_ENDPOINT}
-        flag(func, "measure", self.measure, measures)
-        flag(func, "crease", self.crease, {"CREASE_MAX": CREASE_MAX, "CREASE_NORMAL": CREASE_NORMAL})
-        for name in ("maxShift", "mergeSignificance", "minSignificance"):
-            number(func, name, getattr(self, name), 0)
-        integer(func, "maxGap", self.maxGap, 0)
-
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, ScanLineParams):
-            return NotImplemented
-        return all(np.array_equal(getattr(self, f.name), getattr(other, f.name)) for f in fields(self))
-
-    __hash__ = None  # arrays have no hash
-
-    @classmethod
-    def paper(cls, **options: Any) -> ScanLineParams:
-        """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept."""
-        basic = {"fit": FIT_INTERP, "crease": CREASE_MAX, "maxShift": 0.0, "maxGap": 0}
-        return cls(**{**basic, "mergeSignificance": 0.0, "minSignificance": 0.0, **options})
+_KINDS = {
+    "jump": EDGE_JUMP,
+    "occluding": EDGE_OCCLUDING,
+    "occluded": EDGE_OCCLUDED,
+    "convex": EDGE_CONVEX,
+    "concave": EDGE_CONCAVE,
+    "boundary": EDGE_BOUNDARY,
+}
+_POINT = [("x", "f4"), ("y", "f4"), ("jump", "f4"), ("crease", "f4")]
+_POINT += [("kind", "u1"), ("significance", "f4"), ("direction", "u1")]
 
 
 class EdgeStrength(NamedTuple):
@@ -137,37 +39,49 @@ class EdgeStrength(NamedTuple):
     kind: np.ndarray  # CV_8U, EDGE_* bits
     significance: np.ndarray  # CV_32F, standard deviations
 
-
-def params_of(func: str, eps: float | None, options: dict[str, Any]) -> ScanLineParams:
-    """The keywords of `func` as parameters; an error names `func`."""
-    names = [f.name for f in fields(ScanLineParams)]
-    for name in options:
-        if name not in names:
-            close = difflib.get_close_matches(name, names, 1)
-            hint = f"; did you mean `{close[0]}`?" if close else ""
-            raise error(func, f"unknown argument `{name}`{hint}")
-    with errors_of(func):
-        return ScanLineParams(eps=eps, **options)
+    def __repr__(self) -> str:
+        height, width = self.jump.shape
+        parts = [f"{width} x {height} pixels"]
+        for name, unit in (("jump", ""), ("crease", " degrees"), ("significance", "")):
+            values = getattr(self, name)
+            values = values[values > 0]
+            extent = f" from {values.min():.4g} to {values.max():.4g}{unit}" if values.size else ""
+            parts.append(f"{name} at {values.size}{extent}")
+        return f"EdgeStrength({'; '.join(parts)})"
 
 
-def takes_scan_line_params(function: Callable[..., Any]) -> Callable[..., Any]:
-    """Show the fields of ScanLineParams in the signature of a function that takes them as `**options`."""
-    signature = inspect.signature(function)
-    own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
-    shown = [
-        inspect.Parameter(f.name, inspect.Parameter.KEYWORD_ONLY, default=f.default)
-        for f in fields(ScanLineParams)
-        if f.name not in signature.parameters
-    ]
+@public
+def kindNames(kind: int) -> str:
+    """Name the bits of a kind of edge.
 
-    @functools.wraps(function)
-    def with_options(*args: Any, **kwargs: Any) -> Any:
-        return function(*args, **kwargs)
+    kindNames(kind) -> retval
 
-    with_options.__signature__ = signature.replace(parameters=own + shown)  # type: ignore[attr-defined]
-    return with_options
+    Parameters
+    ----------
+    kind : int
+        Bits EDGE_*, as one pixel of `EdgeStrength.kind` or one point of `edgePoints` has them.
+
+    Returns
+    -------
+    retval : str
+        Of the words jump, occluding, occluded, convex, concave, boundary those whose bits are set; "none" of 0.
+
+    Raises
+    ------
+    rangeedge.error
+        If `kind` is no integer from 0 to 63.
+
+    Examples
+    --------
+    >>> from rangeedge import EDGE_CONVEX, EDGE_JUMP, EDGE_OCCLUDING, kindNames
+    >>> kindNames(EDGE_JUMP | EDGE_OCCLUDING | EDGE_CONVEX)
+    'jump occluding convex'
+    """
+    kind = integer("kind", kind, 0, sum(_KINDS.values()))
+    return " ".join(name for name, bit in _KINDS.items() if kind & bit) or "none"
 
 
+@public
 def splitScanLine(z: np.ndarray, eps: float, pixelSize: float | np.ndarray = 1.0) -> np.ndarray:
     """Split one scan line into quadratic segments.
 
@@ -199,25 +113,25 @@ def splitScanLine(z: np.ndarray, eps: float, pixelSize: float | np.ndarray = 1.0
 
     Notes
     -----
-    Jiang and Bunke, section 4.1 and Fig. 3, after Duda and Hart.
+    Paper, 4.1 and Fig. 3, after Duda and Hart.
 
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import splitScanLine
     >>> splitScanLine(np.array([0, 1, 2, 3, 4, 4, 4, 4.0]), 0.1).tolist()
     [[0, 3], [4, 7]]
     """
-    func = "splitScanLine"
-    z = array(func, "z", z, "a real array of shape (N,)", ndim=(1,))
-    eps = number(func, "eps", eps, 0)
+    z = array("z", z, "a real array of shape (N,)", ndim=(1,))
+    eps = number("eps", eps, 0)
     y = _line(z, np.float64 if z.dtype.itemsize > 4 or z.dtype.kind != "f" else np.float32)
     if np.ndim(pixelSize) == 0:
         x = None
-        number(func, "pixelSize", pixelSize, 0, above=True)
+        number("pixelSize", pixelSize, 0, above=True)
     else:
-        pixelSize = array(func, "pixelSize", pixelSize, "a length or an array like `z`", ndim=(1,))
+        pixelSize = array("pixelSize", pixelSize, "a length or an array like `z`", ndim=(1,))
         if pixelSize.shape != z.shape:
-            raise fail(func, "pixelSize", f"a length or an array of shape {z.shape}", described(pixelSize))
+            raise fail("pixelSize", f"a length or an array of shape {z.shape}", described(pixelSize))
         x = _line(pixelSize, y.dtype)
         y[np.isnan(x)] = np.nan
     return _core.split_scan_line(y, x, eps)
@@ -229,20 +143,24 @@ def _line(values: np.ndarray, dtype: Any) -> np.ndarray:
     return line
 
 
-@takes_scan_line_params
+@takes(SCAN_LINES)
 def edgeStrength(
-    src: np.ndarray, eps: float | None = None, *, mask: np.ndarray | None = None, **options: Any
+    src: np.ndarray,
+    eps: float | None = None,
+    *,
+    mask: np.ndarray | None = None,
+    **options: Unpack[ScanLineOptions],
 ) -> EdgeStrength:
     """Measure how strong an edge every pixel of a range image is, and of which kind.
 
     edgeStrength(src[, eps], *[, mask[, K[, ...]]]) -> jump, crease, kind, significance
 
-    Rows, columns and both diagonals are approximated by curves (P§4.1). At a cut between two of them, f1 and f2,
+    Rows, columns and both diagonals are approximated by curves (paper, 4.1). At a cut between two of them, f1 and f2,
 
         jump = |z1(x) - z2(x)|,  crease = the angle between the normals of f1 and f2 at x,
 
     x being the position of the edge; it is their intersection where the pixels allow that, and then jump = 0
-    (P§4.2). Both pixels beside the cut receive the strengths, and of several candidates the largest.
+    (paper, 4.2). Both pixels beside the cut receive the strengths, and of several candidates the largest.
 
     Parameters
     ----------
@@ -251,12 +169,9 @@ def edgeStrength(
         Integers are divided by `depthFactor` and invalid where <= 0. With `K`, depths that are not positive and
         finite are invalid; without it, only non-finite values are. Heights (`heightMap`) may not be signed integers.
         A point is invalid if a coordinate is not finite, if all are 0, or if it lies behind the viewpoint.
-    eps : float, optional
-        Splitting tolerance as a length; None derives it from the noise.
     mask : ndarray of shape (H, W), 8-bit or bool, optional
         Non-zero where pixels are used.
-    K, pixelSize, heightMap, depthFactor, noise, directions, fit, measure, crease, maxShift, maxGap, ...
-        As in `ScanLineParams`, which holds the defaults.
+    {options}
 
     Returns
     -------
@@ -283,12 +198,12 @@ def edgeStrength(
 
     Notes
     -----
-    Jiang and Bunke, sections 4.1 and 4.2. The result does not depend on the number of threads.
+    Paper, 4.1 and 4.2. The result does not depend on the number of threads.
 
     Examples
     --------
     >>> import numpy as np
-    >>> from rangeedge import EDGE_OCCLUDED, EDGE_OCCLUDING
+    >>> from rangeedge import EDGE_OCCLUDED, EDGE_OCCLUDING, edgeStrength
     >>> z = np.where(np.arange(40) < 20, 1.0, 1.25) * np.ones((30, 1))
     >>> s = edgeStrength(z, noise=0.001)
     >>> float(s.jump[15, 19]), float(s.jump[15, 20]), float(s.jump[15, 21])
@@ -296,13 +211,17 @@ def edgeStrength(
     >>> bool(s.kind[15, 19] & EDGE_OCCLUDING), bool(s.kind[15, 20] & EDGE_OCCLUDED)
     (True, True)
     """
-    params = params_of("edgeStrength", eps, options)
-    return strength_of("edgeStrength", frame_of("edgeStrength", src, params, mask), params)
+    (params,) = parsed({"eps": eps, **options}, ScanLineParams)
+    return measure_strength(measured_frame(src, params, mask), params)
 
 
-@takes_scan_line_params
+@takes(SCAN_LINES)
 def edgePoints(
-    src: np.ndarray, eps: float | None = None, *, mask: np.ndarray | None = None, **options: Any
+    src: np.ndarray,
+    eps: float | None = None,
+    *,
+    mask: np.ndarray | None = None,
+    **options: Unpack[ScanLineOptions],
 ) -> np.ndarray:
     """Find the edge candidates of every scan line, with subpixel positions.
 
@@ -310,8 +229,9 @@ def edgePoints(
 
     Parameters
     ----------
-    src, eps, mask, K, ...
+    src, mask
         As in `edgeStrength`.
+    {options}
 
     Returns
     -------
@@ -329,65 +249,66 @@ def edgePoints(
 
     Notes
     -----
-    Jiang and Bunke, section 4.2 and Fig. 5. The order is by direction, then by line, then along the line.
+    Paper, 4.2 and Fig. 5. The order is by direction, then by line, then along the line.
 
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import edgePoints
     >>> roof = np.abs(np.arange(41) - 20.3) * np.ones((5, 1))
     >>> points = edgePoints(roof, noise=0.001, directions=1)
     >>> len(points), np.unique(points["x"].round(3))
     (5, array([20.3], dtype=float32))
     """
-    params = params_of("edgePoints", eps, options)
-    return points_of("edgePoints", frame_of("edgePoints", src, params, mask), params)
+    (params,) = parsed({"eps": eps, **options}, ScanLineParams)
+    return measure_points(measured_frame(src, params, mask), params)
 
 
-def frame_of(func: str, src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None) -> RangeFrame:
-    """The range image in the form that kernels take."""
-    return range_frame(func, src, params.K, params.pixelSize, params.heightMap, params.depthFactor, mask)
-
-
-def strength_of(func: str, frame: RangeFrame, params: ScanLineParams) -> EdgeStrength:
+def measure_strength(frame: Frame, params: ScanLineParams) -> EdgeStrength:
     """Edge strengths of a checked range image."""
     strength = _no_strength(frame.shape)
-    kernel = frame.kernel(kernel_noise(func, params.noise, frame))
-    _core.edge_strength(kernel, _kernel_options(params), frame.threads, *strength)
+    _core.edge_strength(frame.kernel, _kernel_options(params), frame.threads, *strength)
     return strength
 
 
-def _no_strength(shape: tuple[int, int]) -> EdgeStrength:
-    """All zero. The maps share one allocation: the system takes a while to hand out new memory."""
-    size = shape[0] * shape[1]
-    maps = np.zeros(13 * size, np.uint8)
-    floats = maps[: 12 * size].view(np.float32).reshape(3, *shape)
-    return EdgeStrength(floats[0], floats[1], maps[12 * size :].reshape(shape), floats[2])
-
-
-_POINT = [("x", "f4"), ("y", "f4"), ("jump", "f4"), ("crease", "f4")]
-_POINT += [("kind", "u1"), ("significance", "f4"), ("direction", "u1")]
-
-
-def points_of(func: str, frame: RangeFrame, params: ScanLineParams) -> np.ndarray:
+def measure_points(frame: Frame, params: ScanLineParams) -> np.ndarray:
     """Edge points of a checked range image."""
-    kernel = frame.kernel(kernel_noise(func, params.noise, frame))
-    candidates = _core.edge_candidates(kernel, _kernel_options(params), frame.threads)
+    return _points(_core.edge_candidates(frame.kernel, _kernel_options(params), frame.threads))
+
+
+def measure_both(frame: Frame, params: ScanLineParams) -> tuple[EdgeStrength, np.ndarray]:
+    """Edge strengths and edge points of a checked range image, of one approximation of its scan lines."""
+    strength = _no_strength(frame.shape)
+    found = _core.edge_strength_and_candidates(frame.kernel, _kernel_options(params), frame.threads, *strength)
+    return strength, _points(found)
+
+
+def _points(candidates: dict[str, np.ndarray]) -> np.ndarray:
     points = np.empty(len(candidates["x"]), dtype=_POINT)
     for name in points.dtype.names:
         points[name] = candidates[name]
     return points
 
 
+def _no_strength(shape: tuple[int, int]) -> EdgeStrength:
+    """All zero. Three maps of floats and one of bytes share an allocation: new memory takes the system a while."""
+    size = shape[0] * shape[1]
+    maps = np.zeros(13 * size, np.uint8)
+    floats = maps[: 12 * size].view(np.float32).reshape(3, *shape)
+    return EdgeStrength(floats[0], floats[1], maps[12 * size :].reshape(shape), floats[2])
+
+
 def _kernel_options(params: ScanLineParams) -> _core.ScanLineOptions:
-    return _core.ScanLineOptions(
-        eps=params.eps or 0.0,
-        eps_factor=params.epsFactor,
-        directions=params.directions,
-        interpolate=params.fit == FIT_INTERP,
-        endpoint=params.measure == MEASURE_ENDPOINT,
-        normals=params.crease == CREASE_NORMAL,
-        max_shift=params.maxShift,
-        max_gap=params.maxGap,
-        merge_significance=params.mergeSignificance,
-        min_significance=params.minSignificance,
-    )
+    """The options of scan lines under their names in the kernel."""
+    options = [option for option in ScanLineParams.options.values() if option.group == "scan lines"]
+    values = {_kernel_name(option): _kernel_value(option, getattr(params, option.name)) for option in options}
+    return _core.ScanLineOptions(**values)
+
+
+def _kernel_name(option: Option) -> str:
+    return option.kernel or re.sub(r"([A-Z])", lambda m: "_" + m[1].lower(), option.name)
+
+
+def _kernel_value(option: Option, value: Any) -> Any:
+    """A choice of two as a bool, and 0 for None."""
+    return bool(value) if option.choices else value or 0

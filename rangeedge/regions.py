@@ -2,64 +2,40 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _core
-from ._args import boolean, image8, integer, labels32s, number
-from .detector import found_edges
+from ._check import boolean, image8, labels32s
+from .detector import run_detector
 from .distance import distanceTransform
-from .edges import ScanLineParams
-from .geometry import RangeFrame, range_frame
-from .noise import kernel_noise, noise_of
-from .seeds import extractSeeds, label_statistics, seeding
-from .selection import Selection
+from .frame import Frame
+from .noise import measured_frame
+from .options import GROWING, SEGMENTING, Growing, ScanLineParams, Selection, parsed, takes
+from .seeds import find_seeds, label_statistics
 from .surfaces import surface_map, surfaces_of
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
-class Growing(NamedTuple):
-    """How seeds are found and regions grow from them, with the defaults of `segmentRegions`."""
-
-    minDistance: float = 3.0
-    separation: float = 0.65
-    tolerance: float = 3.0
-    smoothAngle: float = 8.0
-    minArea: int = 100
-
-    def checked(self, func: str) -> Growing:
-        """The same with every value of its own type; an error names `func`."""
-        return Growing(
-            *seeding(func, self.minDistance, self.separation),
-            number(func, "tolerance", self.tolerance, 0, above=True),
-            number(func, "smoothAngle", self.smoothAngle, 0, 30),
-            integer(func, "minArea", self.minArea, 1),
-        )
+    from ._typed import GrowingOptions, SegmentingOptions
 
 
-_DEFAULT = Growing()
-
-
+@takes(GROWING)
 def growRegions(
     src: np.ndarray,
     markers: np.ndarray,
     *,
     edges: np.ndarray | None = None,
-    K: Any = None,
-    pixelSize: Any = None,
-    heightMap: bool = False,
-    depthFactor: float = 1000.0,
     mask: np.ndarray | None = None,
-    noise: Any = None,
-    tolerance: float = _DEFAULT.tolerance,
-    smoothAngle: float = _DEFAULT.smoothAngle,
-    minArea: int = _DEFAULT.minArea,
     newSeeds: bool = False,
+    **options: Unpack[GrowingOptions],
 ) -> np.ndarray:
     """Grow regions from markers: pixels go to the surface they lie on, edges keep surfaces apart.
 
-    growRegions(src, markers, *[, edges[, K[, pixelSize[, heightMap[, depthFactor[, mask[, noise[, tolerance
-    [, smoothAngle[, minArea[, newSeeds]]]]]]]]]]]) -> labels
+    growRegions(src, markers, *[, edges[, mask[, newSeeds[, K[, ...]]]]]) -> labels
 
     1. *Surfaces*: each marker gets a plane by least squares; a quadratic where the plane fails; two planes that meet
        in a crease where those are better than the quadratic, as behind a gap in an edge.
@@ -78,22 +54,17 @@ def growRegions(
 
     Parameters
     ----------
-    src, K, pixelSize, heightMap, depthFactor, mask
-        Range image and its geometry, as for `edgeStrength`.
+    src : ndarray
+        Range image, as for `edgeStrength`.
     markers : (H, W) CV_32S
         Labels > 0 on the pixels to start from, as from `extractSeeds`; several may lie on one surface.
     edges : (H, W) CV_8U or bool, optional
         Edge map, non-zero on edges.
-    noise : NoiseModel, float or (H, W) array, optional
-        Noise of the range image; estimated from it by default.
-    tolerance : float
-        How far a pixel may lie off its surface, in standard deviations, > 0.
-    smoothAngle : float
-        Angle in degrees below which surfaces that meet without an edge go on into each other, from 0 to 30.
-    minArea : int
-        Least area of a region, in pixels.
+    mask : ndarray of shape (H, W), 8-bit or bool, optional
+        Non-zero where pixels are used.
     newSeeds : bool
         Whether areas that no marker reaches grow regions of their own.
+    {options}
 
     Returns
     -------
@@ -107,33 +78,26 @@ def growRegions(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import growRegions
     >>> depth = np.tile(np.abs(np.arange(60.0) - 30), (60, 1))
     >>> markers = np.zeros((60, 60), np.int32)
     >>> markers[20:40, 10:20], markers[20:40, 40:50] = 7, 9
     >>> growRegions(depth, markers, noise=0.1)[0, [0, 29, 31, 59]]
     array([1, 1, 2, 2], dtype=int32)
     """
-    func = "growRegions"
-    frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    growing = Growing(tolerance=tolerance, smoothAngle=smoothAngle, minArea=minArea)
-    return _grow(func, frame, markers, edges, noise, growing, newSeeds)
+    return _grown(src, markers, edges, mask, newSeeds, options)[1]
 
 
+@takes(GROWING)
 def growRegionsWithStats(
     src: np.ndarray,
     markers: np.ndarray,
     *,
     edges: np.ndarray | None = None,
-    K: Any = None,
-    pixelSize: Any = None,
-    heightMap: bool = False,
-    depthFactor: float = 1000.0,
     mask: np.ndarray | None = None,
-    noise: Any = None,
-    tolerance: float = _DEFAULT.tolerance,
-    smoothAngle: float = _DEFAULT.smoothAngle,
-    minArea: int = _DEFAULT.minArea,
     newSeeds: bool = False,
+    **options: Unpack[GrowingOptions],
 ) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Grow regions from markers, and describe each: extent, centre and surface.
 
@@ -143,54 +107,41 @@ def growRegionsWithStats(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import growRegionsWithStats
     >>> markers = np.zeros((40, 50), np.int32)
     >>> markers[10:30, 10:30] = 1
     >>> count, labels, stats, centroids, surfaces = growRegionsWithStats(np.ones((40, 50)), markers)
     >>> count, stats[1], surfaces["normal"][1] + 0.0
     (2, array([   0,    0,   50,   40, 2000], dtype=int32), array([ 0.,  0., -1.]))
     """
-    func = "growRegionsWithStats"
-    frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    growing = Growing(tolerance=tolerance, smoothAngle=smoothAngle, minArea=minArea)
-    return described_regions(frame, _grow(func, frame, markers, edges, noise, growing, newSeeds), heightMap)
+    return described_regions(*_grown(src, markers, edges, mask, newSeeds, options))
 
 
+@takes(SEGMENTING)
 def segmentRegions(
     src: np.ndarray,
     *,
-    K: Any = None,
-    pixelSize: Any = None,
-    heightMap: bool = False,
-    depthFactor: float = 1000.0,
-    mask: np.ndarray | None = None,
-    noise: Any = None,
     edges: np.ndarray | None = None,
-    minDistance: float = _DEFAULT.minDistance,
-    separation: float = _DEFAULT.separation,
-    tolerance: float = _DEFAULT.tolerance,
-    smoothAngle: float = _DEFAULT.smoothAngle,
-    minArea: int = _DEFAULT.minArea,
+    mask: np.ndarray | None = None,
+    **options: Unpack[SegmentingOptions],
 ) -> np.ndarray:
     """Segment a range image into surfaces: one label for each face of a polyhedron, cylinder, sphere.
 
-    segmentRegions(src, *[, K[, pixelSize[, heightMap[, depthFactor[, mask[, noise[, edges[, minDistance[, separation
-    [, tolerance[, smoothAngle[, minArea]]]]]]]]]]]]) -> labels
+    segmentRegions(src, *[, edges[, mask[, K[, ...]]]]) -> labels
 
     `detectEdges`, `distanceTransform` to the edges and to pixels without data, `extractSeeds`, `growRegions` with
     new seeds where none has reached.
 
     Parameters
     ----------
-    src, K, pixelSize, heightMap, depthFactor, mask
-        Range image and its geometry, as for `edgeStrength`.
-    noise : NoiseModel, float or (H, W) array, optional
-        Noise of the range image; estimated from it by default.
+    src : ndarray
+        Range image, as for `edgeStrength`.
     edges : (H, W) CV_8U or bool, optional
         Edge map to use instead of that of `detectEdges` with its defaults.
-    minDistance, separation
-        Of the seeds, as for `extractSeeds`.
-    tolerance, smoothAngle, minArea
-        Of the regions, as for `growRegions`.
+    mask : ndarray of shape (H, W), 8-bit or bool, optional
+        Non-zero where pixels are used.
+    {options}
 
     Returns
     -------
@@ -206,40 +157,31 @@ def segmentRegions(
     --------
     A step and a roof:
 
+    >>> import numpy as np
+    >>> from rangeedge import segmentRegions
     >>> x = np.arange(90)
     >>> depth = np.tile(np.where(x < 30, 60.0, abs(x - 60)), (60, 1))
     >>> segmentRegions(depth, noise=0.1)[30, [0, 29, 31, 57, 63, 89]]
     array([1, 1, 2, 2, 3, 3], dtype=int32)
     """
-    func = "segmentRegions"
-    frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    growing = Growing(minDistance, separation, tolerance, smoothAngle, minArea)
-    return _segment(func, frame, noise, edges, growing)
+    return _segmented(src, edges, mask, options)[1]
 
 
+@takes(SEGMENTING)
 def segmentRegionsWithStats(
     src: np.ndarray,
     *,
-    K: Any = None,
-    pixelSize: Any = None,
-    heightMap: bool = False,
-    depthFactor: float = 1000.0,
-    mask: np.ndarray | None = None,
-    noise: Any = None,
     edges: np.ndarray | None = None,
-    minDistance: float = _DEFAULT.minDistance,
-    separation: float = _DEFAULT.separation,
-    tolerance: float = _DEFAULT.tolerance,
-    smoothAngle: float = _DEFAULT.smoothAngle,
-    minArea: int = _DEFAULT.minArea,
+    mask: np.ndarray | None = None,
+    **options: Unpack[SegmentingOptions],
 ) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Segment a range image into surfaces, and describe each: extent, centre and surface.
 
-    segmentRegionsWithStats(src, *[, K[, ...]]) -> retval, labels, stats, centroids, surfaces
+    segmentRegionsWithStats(src, *[, edges[, mask[, K[, ...]]]]) -> retval, labels, stats, centroids, surfaces
 
     Parameters
     ----------
-    src, K, ...
+    src, edges, mask, K, ...
         As for `segmentRegions`.
 
     Returns
@@ -276,63 +218,61 @@ def segmentRegionsWithStats(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import segmentRegionsWithStats
     >>> x = np.arange(90)
     >>> depth = np.tile(np.where(x < 30, 60.0, abs(x - 60)), (60, 1))
     >>> count, labels, stats, centroids, surfaces = segmentRegionsWithStats(depth, noise=0.1)
     >>> count, surfaces["curved"].tolist(), surfaces["normal"][1].round(3) + 0.0
     (4, [False, False, False, False], array([ 0.,  0., -1.]))
     """
-    func = "segmentRegionsWithStats"
-    frame = range_frame(func, src, K, pixelSize, heightMap, depthFactor, mask)
-    growing = Growing(minDistance, separation, tolerance, smoothAngle, minArea)
-    return described_regions(frame, _segment(func, frame, noise, edges, growing), heightMap)
+    return described_regions(*_segmented(src, edges, mask, options))
 
 
-def _segment(func: str, frame: RangeFrame, noise: Any, edges: np.ndarray | None, growing: Growing) -> np.ndarray:
-    growing = growing.checked(func)
-    noise = noise_of(frame) if noise is None else noise
-    if edges is None:
-        edges = found_edges(func, frame, ScanLineParams(noise=noise), Selection().checked(func)).thin
-    else:
-        edges = image8(func, "edges", edges, frame.shape)
-    return seeded_regions(func, frame, edges, noise, growing)[1]
-
-
-def seeded_regions(
-    func: str, frame: RangeFrame, edges: np.ndarray, noise: Any, growing: Growing
-) -> tuple[np.ndarray, np.ndarray]:
-    """Seeds between the edges of a checked range image, and the regions that grow from them."""
-    distance = distanceTransform((edges != 0) | (frame.valid == 0))
-    _, seeds = extractSeeds(distance, minDistance=growing.minDistance, separation=growing.separation)
-    return seeds, _grow(func, frame, seeds, edges, noise, growing, True)
-
-
-def _grow(
-    func: str,
-    frame: RangeFrame,
+def _grown(
+    src: np.ndarray,
     markers: np.ndarray,
     edges: np.ndarray | None,
-    noise: Any,
-    growing: Growing,
+    mask: np.ndarray | None,
     newSeeds: bool,
-) -> np.ndarray:
-    markers = labels32s(func, "markers", markers, frame.shape)
-    edges = None if edges is None else image8(func, "edges", edges, frame.shape)
-    growing = growing.checked(func)
+    options: Mapping[str, Any],
+) -> tuple[Frame, np.ndarray]:
+    params, growing = parsed(options, ScanLineParams, Growing)
+    frame = measured_frame(src, params, mask)
+    markers = labels32s("markers", markers, frame.shape)
+    edges = None if edges is None else image8("edges", edges, frame.shape)
+    return frame, _grow(frame, markers, edges, growing, boolean("newSeeds", newSeeds))
+
+
+def _segmented(
+    src: np.ndarray, edges: np.ndarray | None, mask: np.ndarray | None, options: Mapping[str, Any]
+) -> tuple[Frame, np.ndarray]:
+    params, growing = parsed(options, ScanLineParams, Growing)
+    frame = measured_frame(src, params, mask)
+    edges = run_detector(frame, params, Selection())[0] if edges is None else image8("edges", edges, frame.shape)
+    return frame, seeded_regions(frame, edges, growing)[1]
+
+
+def seeded_regions(frame: Frame, edges: np.ndarray, growing: Growing) -> tuple[np.ndarray, np.ndarray]:
+    """Seeds between the edges of a checked range image, and the regions that grow from them."""
+    distance = distanceTransform((edges != 0) | (frame.valid == 0))
+    _, seeds = find_seeds(distance, growing, None)
+    return seeds, _grow(frame, seeds, edges, growing, True)
+
+
+def _grow(frame: Frame, markers: np.ndarray, edges: np.ndarray | None, growing: Growing, new_seeds: bool) -> np.ndarray:
     options = _core.RegionOptions(
         tolerance=growing.tolerance,
         smooth_angle=growing.smoothAngle,
         min_area=growing.minArea,
-        new_seeds=boolean(func, "newSeeds", newSeeds),
+        new_seeds=new_seeds,
     )
     labels = np.empty(frame.shape, np.int32)
-    _core.grow_regions(surface_map(frame, kernel_noise(func, noise, frame), edges), markers, options, labels)
+    _core.grow_regions(surface_map(frame, edges), markers, options, labels)
     return labels
 
 
-def described_regions(
-    frame: RangeFrame, labels: np.ndarray, heightMap: bool
-) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def described_regions(frame: Frame, labels: np.ndarray) -> tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """What `segmentRegionsWithStats` returns of labelled regions."""
     count = int(labels.max()) + 1
-    return count, labels, *label_statistics(labels, count), surfaces_of(frame, labels, count, heightMap)
+    return count, labels, *label_statistics(labels, count), surfaces_of(frame, labels, count)

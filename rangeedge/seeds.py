@@ -1,20 +1,29 @@
-"""Seeds: compact markers in the middle of surfaces, far from every edge (P§7)."""
+"""Seeds: compact markers in the middle of surfaces, far from every edge (paper, 7)."""
 
 from __future__ import annotations
+
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
 from . import _core
-from ._args import array, described, error, fail, image8, image32f, number
+from ._check import array, error, fail, image8, image32f
+from .options import SEEDING, Seeding, takes
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._typed import SeedingOptions
 
 
+@takes(SEEDING)
 def extractSeeds(
-    distance: np.ndarray, *, minDistance: float = 3.0, separation: float = 0.65, mask: np.ndarray | None = None
+    distance: np.ndarray, *, mask: np.ndarray | None = None, **options: Unpack[SeedingOptions]
 ) -> tuple[int, np.ndarray]:
     """Markers in the middle of surfaces: the peaks of a distance map, each with the plateau around it.
 
-    extractSeeds(distance, *[, minDistance[, separation[, mask]]]) -> retval, markers
+    extractSeeds(distance, *[, mask[, minDistance[, separation]]]) -> retval, markers
 
     A pixel is a peak by itself where every 8-connected path to a higher one drops below ``separation`` times its
     distance; its seed is what can be reached from it without doing so, {p: D(p) >= separation D(peak)}. So a gap in an
@@ -26,12 +35,9 @@ def extractSeeds(
     distance : (H, W) CV_32F
         Distance to the nearest edge, from `distanceTransform` or `salienceDistanceTransform`; >= 0, +inf allowed. Where
         pixels have no data, count them as edges of the map that is transformed, or leave them out by `mask`.
-    minDistance : float
-        Least distance of a peak, in pixels, > 0.
-    separation : float
-        Share of the lower of two peaks to which the way between them must drop for both to count, in (0, 1).
     mask : (H, W) CV_8U or bool, optional
         Where it is zero there are no seeds, nor ways between them.
+    {options}
 
     Returns
     -------
@@ -54,24 +60,28 @@ def extractSeeds(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import extractSeeds
     >>> distance = np.float32([[0, 1, 2, 3, 2, 1, 2, 3, 4, 3, 2, 1, 0]])
     >>> extractSeeds(distance, minDistance=2, separation=0.75)
     (3, array([[0, 0, 0, 1, 0, 0, 0, 2, 2, 2, 0, 0, 0]], dtype=int32))
     """
-    return _seeds("extractSeeds", distance, minDistance, separation, mask)
+    return find_seeds(distance, Seeding(**options), mask)
 
 
+@takes(SEEDING)
 def extractSeedsWithStats(
-    distance: np.ndarray, *, minDistance: float = 3.0, separation: float = 0.65, mask: np.ndarray | None = None
+    distance: np.ndarray, *, mask: np.ndarray | None = None, **options: Unpack[SeedingOptions]
 ) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
     """Markers in the middle of surfaces, with the extent and the centre of each.
 
-    extractSeedsWithStats(distance, *[, minDistance[, separation[, mask]]]) -> retval, markers, stats, centroids
+    extractSeedsWithStats(distance, *[, mask[, minDistance[, separation]]]) -> retval, markers, stats, centroids
 
     Parameters
     ----------
-    distance, minDistance, separation, mask
+    distance, mask
         As for `extractSeeds`.
+    {options}
 
     Returns
     -------
@@ -90,12 +100,15 @@ def extractSeedsWithStats(
 
     Examples
     --------
+    >>> import cv2
+    >>> import numpy as np
+    >>> from rangeedge import extractSeedsWithStats
     >>> distance = np.float32([[0, 1, 2, 3, 2, 1, 2, 3, 4, 3, 2, 1, 0]])
     >>> _, _, stats, centroids = extractSeedsWithStats(distance, minDistance=2, separation=0.75)
     >>> stats[1:, cv2.CC_STAT_AREA], centroids[1:, 0]
     (array([1, 3], dtype=int32), array([3., 8.]))
     """
-    count, markers = _seeds("extractSeedsWithStats", distance, minDistance, separation, mask)
+    count, markers = find_seeds(distance, Seeding(**options), mask)
     return count, markers, *label_statistics(markers, count)
 
 
@@ -116,24 +129,13 @@ def label_statistics(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.nda
     return np.column_stack([first, last - first + 1, area]).astype(np.int32), centroids
 
 
-def seeding(func: str, minDistance: float, separation: float) -> tuple[float, float]:
-    """The parameters of `extractSeeds`, checked."""
-    minDistance = number(func, "minDistance", minDistance, 0, above=True)
-    separation = number(func, "separation", separation, 0, 1, above=True)
-    if separation == 1:
-        raise fail(func, "separation", "below 1", described(separation), cv2.Error.StsOutOfRange)
-    return minDistance, separation
-
-
-def _seeds(
-    func: str, distance: np.ndarray, minDistance: float, separation: float, mask: np.ndarray | None
-) -> tuple[int, np.ndarray]:
-    distance = image32f(func, "distance", array(func, "distance", distance, "a real array of shape (H, W)"))
+def find_seeds(distance: np.ndarray, seeding: Seeding, mask: np.ndarray | None) -> tuple[int, np.ndarray]:
+    """Number of labels, and markers of the seeds in a distance map."""
+    distance = image32f("distance", array("distance", distance, "a real array of shape (H, W)"))
     if distance.size >= 2**30:
-        raise error(func, f"`distance` must have fewer than 2^30 pixels, got {distance.size}", cv2.Error.StsOutOfRange)
+        raise error(f"`distance` must have fewer than 2^30 pixels, got {distance.size}", cv2.Error.StsOutOfRange)
     if not distance.min() >= 0:  # NaN fails, too
-        raise fail(func, "distance", ">= 0 everywhere", f"a least value of {distance.min():g}")
-    minDistance, separation = seeding(func, minDistance, separation)
-    mask = None if mask is None else image8(func, "mask", mask, distance.shape)
+        raise fail("distance", ">= 0 everywhere", f"a least value of {distance.min():g}")
+    mask = None if mask is None else image8("mask", mask, distance.shape)
     markers = np.empty(distance.shape, np.int32)
-    return _core.extract_seeds(distance, mask, minDistance, separation, markers) + 1, markers
+    return _core.extract_seeds(distance, mask, seeding.minDistance, seeding.separation, markers) + 1, markers

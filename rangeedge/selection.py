@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import inspect
+from typing import TYPE_CHECKING, Any, overload
 
 import cv2
 import numpy as np
 
-from . import _args, _core
+from . import _check, _core
+from ._check import public
+from .constants import EDGE_OCCLUDING
+from .edges import EdgeStrength
+from .options import SELECTION, Selection, takes
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._typed import RefinementOptions
 
 _CHAIN_ALPHA = 6.0  # Venkatesh and Rosin: how many deviations above the population an edge must stand
 _CHAIN_POPULATION = 10  # fewer chains than this have no statistics to speak of
 _MAD_TO_MEAN_DEVIATION = 1.4826 * np.sqrt(2 / np.pi)  # of a normal population
 
 
+@public
 def strengthImage(strength: np.ndarray, cut: float, dst: np.ndarray | None = None) -> np.ndarray:
     """Map edge strengths to grey levels, saturating at a cut value.
 
@@ -42,19 +53,21 @@ def strengthImage(strength: np.ndarray, cut: float, dst: np.ndarray | None = Non
 
     Notes
     -----
-    Jiang and Bunke, section 6. Level 80 of a crease image is 20 degrees, level 120 is 30 degrees.
+    Paper, 6. Level 80 of a crease image is 20 degrees, level 120 is 30 degrees.
 
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import strengthImage
     >>> strengthImage(np.float32([[0, 0.1, 20, 30, 64, 90]]), 64)
     array([[  0,   1,  80, 120, 255, 255]], dtype=uint8)
     """
-    strength = _args.strength32f("strengthImage", "strength", strength)
-    cut = _args.number("strengthImage", "cut", cut, 0, above=True)
-    return _args.deliver("strengthImage", "dst", _grey_levels(strength, cut), dst)
+    strength = _check.strength32f("strength", strength)
+    cut = _check.number("cut", cut, 0, above=True)
+    return _check.deliver("dst", _grey_levels(strength, cut), dst)
 
 
+@public
 def overallStrength(
     jump: np.ndarray, crease: np.ndarray, jumpCut: float, creaseCut: float = 64.0, dst: np.ndarray | None = None
 ) -> np.ndarray:
@@ -86,37 +99,56 @@ def overallStrength(
 
     Notes
     -----
-    Jiang and Bunke, section 6.
+    Paper, 6.
 
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import overallStrength
     >>> overallStrength(np.float32([[0, 0.5, 2]]), np.float32([[0, 64, 32]]), jumpCut=1)
     array([[  0, 255, 255]], dtype=uint8)
     """
-    func = "overallStrength"
-    jump = _args.strength32f(func, "jump", jump)
-    crease = _args.strength32f(func, "crease", crease, jump.shape)
-    jumpCut = _args.number(func, "jumpCut", jumpCut, 0, above=True)
-    creaseCut = _args.number(func, "creaseCut", creaseCut, 0, above=True)
+    jump = _check.strength32f("jump", jump)
+    crease = _check.strength32f("crease", crease, jump.shape)
+    jumpCut = _check.number("jumpCut", jumpCut, 0, above=True)
+    creaseCut = _check.number("creaseCut", creaseCut, 0, above=True)
     merged = cv2.max(_grey_levels(jump, jumpCut), _grey_levels(crease, creaseCut))
-    return _args.deliver(func, "dst", merged, dst)
+    return _check.deliver("dst", merged, dst)
 
 
+@overload
+def selectEdges(
+    strength: EdgeStrength,
+    jumpThreshold: float | None = None,
+    creaseThreshold: float = 30.0,
+    *,
+    dst: np.ndarray | None = None,
+    **options: Unpack[RefinementOptions],
+) -> np.ndarray: ...
+
+
+@overload
 def selectEdges(
     jump: np.ndarray,
     crease: np.ndarray,
     jumpThreshold: float,
     creaseThreshold: float = 30.0,
     *,
-    hysteresis: float = 1.0,
-    minLength: int = 1,
-    dynamic: bool = False,
     dst: np.ndarray | None = None,
-) -> np.ndarray:
+    **options: Unpack[RefinementOptions],
+) -> np.ndarray: ...
+
+
+@public
+def selectEdges(*args: Any, **options: Any) -> np.ndarray:
     """Select edge pixels by strength, by connection to strong ones, by length and by chain statistics.
 
+    selectEdges(strength[, jumpThreshold[, creaseThreshold]], *[, hysteresis[, minLength[, dynamic[, dst]]]]) -> dst
     selectEdges(jump, crease, jumpThreshold[, creaseThreshold], *[, hysteresis[, minLength[, dynamic[, dst]]]]) -> dst
+
+    With what `edgeStrength` returns, this is the selection of `detectEdges` with its defaults, so that
+    ``thinEdges(selectEdges(strength, ...))`` is the same map: jumps count on their nearer side, and creases where
+    three of their neighbours are creases as well, lest lines fray. With maps of jump and crease every pixel counts.
 
     The steps run in this order, each on what the one before has left:
 
@@ -130,19 +162,22 @@ def selectEdges(
 
     Parameters
     ----------
+    strength : EdgeStrength
+        As from `edgeStrength`.
     jump : ndarray of shape (H, W), CV_32F or any real type
         Jump strength, a length; finite and >= 0, 0 where there is no edge.
     crease : ndarray of shape (H, W), CV_32F or any real type
         Crease strength in degrees; finite and >= 0, 0 where there is no edge.
     jumpThreshold : float
-        Least jump, in the unit of `jump`. With 0 every jump counts; ``numpy.inf`` switches jump edges off.
+        Least jump, in the unit of `jump`. With 0 every jump counts, as with None (for `strength`, the default);
+        ``numpy.inf`` switches jump edges off.
     creaseThreshold : float
         Least crease in degrees; 0 and ``numpy.inf`` as above.
     hysteresis : float
         Low thresholds as a fraction of the high ones, in (0, 1]; 1 is no hysteresis.
     minLength : int
-        Least length of an 8-connected component in pixels, >= 1. The length is the longer side of the
-        bounding box: the number of pixels of a straight line, however thick.
+        Least length of an 8-connected component in pixels, >= 1; by default 5 for `strength`, else 1. The length is
+        the longer side of the bounding box: the number of pixels of a straight line, however thick.
     dynamic : bool
         Whether to apply the dynamic threshold. It needs a map whose candidates are mostly noise, so pass
         strengths found with ``minSignificance=0`` and low thresholds.
@@ -162,7 +197,7 @@ def selectEdges(
 
     Notes
     -----
-    Thresholds after Jiang and Bunke, section 6: 20 degrees for quiet scanners, 30 for noisy ones.
+    Thresholds as in the paper, 6: 20 degrees for quiet scanners, 30 for noisy ones.
 
     The dynamic threshold is that of Venkatesh and Rosin (1995), for either type of edge by itself: the
     candidates (positive strength) are thinned and cut at junctions into chains of length L and mean
@@ -178,44 +213,70 @@ def selectEdges(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import detectEdges, edgeStrength, selectEdges, thinEdges
     >>> jump, crease = np.zeros((2, 1, 6), np.float32)
     >>> jump[0] = 2, 4, 2, 0, 2, 0
     >>> selectEdges(jump, crease, 3)
     array([[  0, 255,   0,   0,   0,   0]], dtype=uint8)
     >>> selectEdges(jump, crease, 3, hysteresis=0.5)
     array([[255, 255, 255,   0,   0,   0]], dtype=uint8)
+    >>> depth = np.full((48, 64), 2.0)
+    >>> depth[12:36, 16:48] = 1.5
+    >>> strength = edgeStrength(depth, noise=0.001)
+    >>> bool((thinEdges(selectEdges(strength, 0.1)) == detectEdges(depth, 0.1, noise=0.001)).all())
+    True
     """
-    func = "selectEdges"
-    jump = _args.strength32f(func, "jump", jump)
-    crease = _args.strength32f(func, "crease", crease, jump.shape)
-    jumpThreshold = _args.threshold(func, "jumpThreshold", jumpThreshold)
-    selection = Selection(jumpThreshold, creaseThreshold, hysteresis, minLength, dynamic).checked(func)
-    return _args.deliver(func, "dst", selected(jump, crease, selection), dst)
+    given = args[0] if args else options.get("strength")
+    return _of_strength(*args, **options) if isinstance(given, EdgeStrength) else _of_maps(*args, **options)
 
 
-class Selection(NamedTuple):
-    """Which strengths make an edge, with the defaults of `detectEdges`."""
-
-    jumpThreshold: float | None = None
-    creaseThreshold: float = 30.0
-    hysteresis: float = 1.0
-    minLength: int = 5
-    dynamic: bool = False
-
-    def checked(self, func: str) -> Selection:
-        """The same with every value of its own type; an error names `func`."""
-        return Selection(
-            0.0 if self.jumpThreshold is None else _args.threshold(func, "jumpThreshold", self.jumpThreshold),
-            _args.threshold(func, "creaseThreshold", self.creaseThreshold),
-            _args.number(func, "hysteresis", self.hysteresis, 0, 1, above=True),
-            _args.integer(func, "minLength", self.minLength, 1),
-            _args.boolean(func, "dynamic", self.dynamic),
-        )
+@takes(SELECTION)
+def _of_strength(
+    strength: EdgeStrength,
+    jumpThreshold: float | None = None,
+    creaseThreshold: float = 30.0,
+    *,
+    dst: np.ndarray | None = None,
+    **options: Any,
+) -> np.ndarray:
+    selection = Selection(jumpThreshold=jumpThreshold, creaseThreshold=creaseThreshold, **options)
+    jump = _check.strength32f("strength.jump", strength.jump)
+    crease = _check.strength32f("strength.crease", strength.crease, jump.shape)
+    kind = _check.image8("strength.kind", strength.kind, jump.shape)
+    edges = select_strength(EdgeStrength(jump, crease, kind, strength.significance), selection)
+    return _check.deliver("dst", edges, dst)
 
 
-def selected(jump: np.ndarray, crease: np.ndarray, selection: Selection) -> np.ndarray:
-    """The edge map, 0 and 255, of checked strengths by checked parameters."""
-    thresholds, hysteresis = (selection.jumpThreshold, selection.creaseThreshold), selection.hysteresis
+@takes(SELECTION)
+def _of_maps(
+    jump: np.ndarray,
+    crease: np.ndarray,
+    jumpThreshold: float,
+    creaseThreshold: float = 30.0,
+    *,
+    dst: np.ndarray | None = None,
+    **options: Any,
+) -> np.ndarray:
+    jump = _check.strength32f("jump", jump)
+    crease = _check.strength32f("crease", crease, jump.shape)
+    jumpThreshold = _check.threshold("jumpThreshold", jumpThreshold)
+    selection = Selection(jumpThreshold=jumpThreshold, creaseThreshold=creaseThreshold, **{"minLength": 1, **options})
+    return _check.deliver("dst", select_maps(jump, crease, selection), dst)
+
+
+selectEdges.__signature__ = inspect.signature(_of_strength)  # type: ignore[attr-defined]
+
+
+def select_strength(strength: EdgeStrength, selection: Selection) -> np.ndarray:
+    """The edge map before thinning: jumps on their nearer side, and creases that do not stand alone."""
+    jump = cv2.copyTo(strength.jump, strength.kind & np.uint8(EDGE_OCCLUDING))
+    crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold)
+    return select_maps(jump, crease, selection)
+
+
+def select_maps(jump: np.ndarray, crease: np.ndarray, selection: Selection) -> np.ndarray:
+    """The edge map, 0 and 255, of checked strengths."""
+    thresholds, hysteresis = (selection.jumpThreshold or 0.0, selection.creaseThreshold), selection.hysteresis
     edges = _reaching(jump, crease, thresholds)
     if hysteresis < 1:
         low = (hysteresis * thresholds[0], hysteresis * thresholds[1])
@@ -227,8 +288,20 @@ def selected(jump: np.ndarray, crease: np.ndarray, selection: Selection) -> np.n
     return edges.view(np.uint8) * np.uint8(255)
 
 
+def _unfrayed(crease: np.ndarray, least: float) -> np.ndarray:
+    """Creases without stray pixels: of the nine around one that stays, four reach `least`.
+
+    In an image of one or two rows or columns lines cannot have so many neighbours: all its creases stay.
+    """
+    if min(crease.shape) < 3:
+        return crease
+    strong = _at_least(crease, least).view(np.uint8)
+    around = cv2.boxFilter(strong, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    return cv2.copyTo(crease, (around >= 4).view(np.uint8))
+
+
 def _grey_levels(strength: np.ndarray, cut: float) -> np.ndarray:
-    """P§6, at the edge pixels only; in double precision, so that a strength of exactly one level stays there."""
+    """Paper, 6, at the edge pixels only; in double precision, so that a strength of exactly one level stays there."""
     levels = np.zeros(strength.shape, np.uint8)
     edge = strength > 0
     levels[edge] = np.minimum(np.ceil(255 * strength[edge].astype(np.float64) / cut), 255)
@@ -237,10 +310,10 @@ def _grey_levels(strength: np.ndarray, cut: float) -> np.ndarray:
 
 def _reaching(jump: np.ndarray, crease: np.ndarray, thresholds: tuple[float, float]) -> np.ndarray:
     """Where a positive strength reaches its threshold, as bool."""
-    return at_least(jump, thresholds[0]) | at_least(crease, thresholds[1])
+    return _at_least(jump, thresholds[0]) | _at_least(crease, thresholds[1])
 
 
-def at_least(strength: np.ndarray, threshold: float) -> np.ndarray:
+def _at_least(strength: np.ndarray, threshold: float) -> np.ndarray:
     """Where a positive strength reaches a threshold, which may be 0 or more than a float32 holds."""
     if threshold > float(np.finfo(np.float32).max):
         return np.zeros(strength.shape, bool)
@@ -271,7 +344,7 @@ def _pixels_of(edges: np.ndarray, labels: np.ndarray, keep: np.ndarray) -> np.nd
 
 
 def _outstanding(strength: np.ndarray) -> np.ndarray:
-    """Where the nearest chain of candidates passes the threshold of Venkatesh and Rosin (L§6)."""
+    """Where the nearest chain of candidates passes the threshold of Venkatesh and Rosin."""
     candidates = strength > 0
     if not candidates.any():
         return candidates

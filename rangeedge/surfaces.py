@@ -5,23 +5,23 @@ from __future__ import annotations
 import numpy as np
 
 from . import _core
-from .geometry import RangeFrame
+from .frame import Frame
 
 SURFACE = np.dtype([("curved", np.bool_), ("centroid", "3f8"), ("normal", "3f8"), ("quadric", "10f8"), ("rms", "f8")])
 _CURVED_GAIN = 0.8  # a quadratic must lower the rms of a plane to this share
 _QUADRIC_POINTS = 40  # fewer tell no curvature
 
 
-def surface_map(frame: RangeFrame, noise: _core.Noise, edges: np.ndarray | None) -> _core.RangeMap:
+def surface_map(frame: Frame, edges: np.ndarray | None) -> _core.RangeMap:
     """What the kernels on surfaces take: places on the image plane, ordinates and their noise, edges."""
     x, y, to_plane = _places(frame)
     seen = frame.ordinate[frame.valid.view(bool)]
     offset = float(seen[:: max(1, len(seen) // 4096)].mean(dtype=np.float64)) if len(seen) else 0.0
     ordinate = (frame.ordinate - frame.ordinate.dtype.type(offset)).astype(np.float32, copy=False)
-    return _core.RangeMap(frame.kernel(noise), x, y, ordinate, offset, to_plane, edges)
+    return _core.RangeMap(frame.kernel, x, y, ordinate, offset, to_plane, edges)
 
 
-def _places(frame: RangeFrame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[float, ...]]:
+def _places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[float, ...]]:
     """Where pixels lie on the image plane, in units of about a pixel, and how that becomes coordinates.
 
     None for a regular grid: columns and rows.
@@ -43,39 +43,17 @@ def _places(frame: RangeFrame) -> tuple[np.ndarray | None, np.ndarray | None, tu
     return (x / spacing).astype(np.float32), (y / spacing).astype(np.float32), to_plane
 
 
-def surfaces_of(frame: RangeFrame, labels: np.ndarray, count: int, heightMap: bool) -> np.ndarray:
+def surfaces_of(frame: Frame, labels: np.ndarray, count: int) -> np.ndarray:
     """The plane, or the quadric where a plane fails, of every label 1 .. count - 1."""
     surfaces = np.zeros(count, SURFACE)
-    points = _points(frame, heightMap).reshape(-1, 3)
-    toward = _toward_viewer(frame, heightMap)
+    points = frame.points.reshape(-1, 3)
+    toward = frame.toward_viewer
     order = np.argsort(labels, axis=None, kind="stable")
     starts = np.searchsorted(labels.ravel()[order], np.arange(count + 1))
     for label in range(1, count):
         inside = order[starts[label] : starts[label + 1]]
         _describe(surfaces[label], points[inside], frame.ordinate.ravel()[inside], inside, labels.shape[1], toward)
     return surfaces
-
-
-def _points(frame: RangeFrame, heightMap: bool) -> np.ndarray:
-    if frame.samples.ndim == 3:
-        return frame.samples.astype(np.float64)
-    v, u = np.indices(frame.shape)
-    a, b, c, d, e, f = frame.to_plane
-    x, y = a * u + b * v + c, d * u + e * v + f
-    if not frame.projective:
-        return np.stack([x, y, frame.ordinate if heightMap else -frame.ordinate], axis=-1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        z = 1 / frame.ordinate.astype(np.float64)
-    return np.stack([x * z, y * z, z], axis=-1)
-
-
-def _toward_viewer(frame: RangeFrame, heightMap: bool) -> np.ndarray | None:
-    """The direction toward the viewer; None where it is that of the origin."""
-    if frame.projective:
-        return None
-    if frame.samples.ndim == 3:
-        return -np.asarray(frame.axis)
-    return np.array([0.0, 0.0, 1.0 if heightMap else -1.0])
 
 
 def _describe(

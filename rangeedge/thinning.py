@@ -5,12 +5,13 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from . import _args
-from ._constants import THIN_ITERATIVE, THIN_LEE, THIN_SKELETON
+from . import _check
+from .constants import THIN_ITERATIVE, THIN_LEE, THIN_SKELETON
 
 _METHODS = {"THIN_SKELETON": THIN_SKELETON, "THIN_LEE": THIN_LEE, "THIN_ITERATIVE": THIN_ITERATIVE}
 
 
+@_check.public
 def thinEdges(edges: np.ndarray, method: int = THIN_SKELETON, dst: np.ndarray | None = None) -> np.ndarray:
     """Thin an edge map to lines one pixel wide that are connected as the map was.
 
@@ -51,6 +52,7 @@ def thinEdges(edges: np.ndarray, method: int = THIN_SKELETON, dst: np.ndarray | 
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge import thinEdges
     >>> edges = np.zeros((4, 6), np.uint8)
     >>> edges[1:3] = 255
     >>> thinEdges(edges)
@@ -59,15 +61,15 @@ def thinEdges(edges: np.ndarray, method: int = THIN_SKELETON, dst: np.ndarray | 
            [  0,   0,   0,   0,   0,   0],
            [  0,   0,   0,   0,   0,   0]], dtype=uint8)
     """
-    edges = _args.image8("thinEdges", "edges", edges)
-    method = _args.flag("thinEdges", "method", method, _METHODS)
+    edges = _check.image8("edges", edges)
+    method = _check.flag("method", method, _METHODS)
     thin = np.zeros_like(edges)
     x, y, width, height = cv2.boundingRect(edges)
     if width:
         box = np.s_[y : y + height, x : x + width]
         thin[box] = _skeleton(edges[box] != 0, method)
         thin *= 255
-    return _args.deliver("thinEdges", "dst", thin, dst)
+    return _check.deliver("dst", thin, dst)
 
 
 def _skeleton(edges: np.ndarray, method: int) -> np.ndarray:

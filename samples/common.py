@@ -27,17 +27,15 @@ def load(args):
     """The range image, and its geometry as keywords of the functions that take it."""
     if args.image is None:
         return built_in_scene()
-    src, geometry = rangeedge.imreadRange(args.image)
-    if args.K is not None or args.pixel_size is not None:  # in place of what the file says
-        geometry = {name: value for name, value in geometry.items() if name == "depthFactor"}
+    given = {}
     if args.K is not None:
         fx, fy, cx, cy = map(float, args.K.split(","))
-        geometry["K"] = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+        given["K"] = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
     if args.pixel_size is not None:
-        geometry["pixelSize"] = args.pixel_size
+        given["pixelSize"] = args.pixel_size
     if args.height_map:
-        geometry["heightMap"] = True
-    return src, geometry
+        given["heightMap"] = True
+    return rangeedge.imreadRange(args.image).withGeometry(**given)
 
 
 @cache

@@ -16,8 +16,7 @@ def main(argv=None):
     args = parser(__doc__).parse_args(argv)
     src, geometry = load(args)
 
-    strength = rangeedge.edgeStrength(src, **geometry)
-    edges = rangeedge.detectEdges(src, **geometry)
+    edges, strength = rangeedge.detectEdgesWithStrength(src, **geometry)
     print(f"{np.count_nonzero(edges)} edge pixels")
 
     view = relief(src, geometry)

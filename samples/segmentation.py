@@ -19,8 +19,7 @@ def main(argv=None):
     args = parser(__doc__).parse_args(argv)
     src, geometry = load(args)
 
-    strength = rangeedge.edgeStrength(src, **geometry)
-    edges = rangeedge.detectEdges(src, **geometry)
+    edges, strength = rangeedge.detectEdgesWithStrength(src, **geometry)
     missing = gaps(src, geometry)
     distance = rangeedge.distanceTransform(edges | missing)
     count, markers = rangeedge.extractSeeds(distance, minDistance=4)

@@ -21,7 +21,7 @@ def main(argv=None):
     src, geometry = load(args)
 
     strength = rangeedge.edgeStrength(src, **geometry)
-    edges = rangeedge.selectEdges(strength.jump, strength.crease, 0.0, minLength=5)
+    edges = rangeedge.selectEdges(strength)
     print(f"{np.count_nonzero(edges)} edge pixels before thinning")
 
     panels = [("before thinning", edges)]

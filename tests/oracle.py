@@ -49,7 +49,7 @@ STEPS = {DIR_ROWS: (1, 0), DIR_COLS: (0, 1), DIR_DIAG45: (1, -1), DIR_DIAG135: (
 KINDS = EDGE_JUMP | EDGE_CONVEX | EDGE_CONCAVE
 
 
-# Splitting (P§4.1).
+# Splitting (paper, 4.1).
 
 
 def split(y, x, eps, scale=None):
@@ -345,7 +345,7 @@ class Image:
         return x.astype(dtype), y.astype(dtype), lambda w: ((offset + w * along)[:2], along[:2])
 
 
-# The steps of P§4.
+# The steps of the paper, 4.
 
 
 class Detector:

@@ -189,7 +189,7 @@ def test_smooth_surfaces_have_no_edges_without_noise(name, camera):
     assert false_edges(rendering, rendering.depth, reach=12.0) == 0
 
 
-# Two cylinders (P§4.1, Fig. 3, and P§4.2, Table 2).
+# Two cylinders (paper, 4.1, Fig. 3, and 4.2, Table 2).
 
 TWO_CYLINDERS = {
     "paper": ScanLineParams.paper(),

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from rangeedge import NoiseModel, error, imwriteRange
+from rangeedge.app.cli import main
+from rangeedge.app.results import EDGE_FILES, plain
 from rangeedge.batch import detectBatch
-from rangeedge.cli import main
-from rangeedge.results import EDGE_FILES, plain
 
 K = np.array([[50, 0, 19.5], [0, 50, 14.5], [0, 0, 1]])
 

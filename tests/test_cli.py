@@ -24,8 +24,8 @@ from rangeedge import (
     segmentRegions,
     segmentRegionsWithStats,
 )
-from rangeedge.cli import main
-from rangeedge.results import EDGE_FILES, REGION_FILES, find_regions, region_files, write_folder
+from rangeedge.app.cli import main
+from rangeedge.app.results import EDGE_FILES, REGION_FILES, find_regions, region_files, write_folder
 
 K = np.array([[100, 0, 39.5], [0, 100, 29.5], [0, 0, 1]])
 CAMERA = ["-K", "100,100,39.5,29.5"]
@@ -407,7 +407,7 @@ class TestHelp:
                      "--directions", "--fit", "--measure", "--crease ", "--max-shift", "--max-gap",
                      "--min-significance", "--jump-threshold", "--crease-threshold", "--min-length"):  # fmt: skip
             assert flag in said
-        assert "(default: 30.0)" in said
+        assert "(degrees; default: 30)" in " ".join(said.split())
         assert "--depth-factor X Divides integer values" in " ".join(said.split())
 
     def test_version(self, capsys):

@@ -7,7 +7,8 @@ import pytest
 import rangeedge
 from rangeedge import _core
 from rangeedge.closure import closeContours
-from rangeedge.geometry import range_frame
+from rangeedge.noise import measured_frame
+from rangeedge.options import ScanLineParams
 from rangeedge.surfaces import surface_map
 
 CROSS = cv2.getStructuringElement(cv2.MORPH_CROSS, (3, 3))
@@ -38,9 +39,9 @@ def noisy(depth, sigma=0.1, seed=0):
 def is_surface(src, inside, sigma=0.1, tolerance=3.0, share=0.9):
     """The kernel's verdict on a connected set of pixels: nothing dilated."""
     regions = np.zeros(inside.shape, np.int32)
-    surfaces = surface_map(range_frame("test", src), _core.Noise(sigma, 0.0, 0.0, 1.0), (~inside).view(np.uint8))
     options = _core.ClosureOptions(correlation=1.0, tolerance=tolerance, share=share, dilations=0, min_area=1)
-    _core.verified_regions(surfaces, options, regions)
+    frame = measured_frame(src, ScanLineParams(noise=sigma))
+    _core.verified_regions(surface_map(frame, (~inside).view(np.uint8)), options, regions)
     assert not regions.any() or np.array_equal(regions, inside.astype(np.int32))
     return bool(regions.any())
 

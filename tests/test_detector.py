@@ -2,7 +2,6 @@
 
 import inspect
 import os
-from dataclasses import fields
 
 import cv2
 import numpy as np
@@ -20,24 +19,30 @@ from rangeedge import (
     ScanLineParams,
     createScanLineDetector,
     detectEdges,
+    detectEdgesWithStrength,
     edgePoints,
     edgeStrength,
     selectEdges,
     thinEdges,
 )
-from rangeedge.detector import ScanLineDetector, selected_of
-from rangeedge.selection import Selection
+from rangeedge.detector import ScanLineDetector
+from rangeedge.options import DETECTION, SCAN_LINES
 
 K = np.array([[200, 0, 47.5], [0, 210, 35.5], [0, 0, 1]])
 FORMATS = ["xml", "yml", "yaml", "json"]
-FIELDS = [f.name for f in fields(ScanLineParams)]
+DEFAULTS = {name: option.default for name, option in DETECTION.items()}
+FIELDS = list(DETECTION)
 FLAGS = ("fit", "measure", "crease")  # of the values 0 and 1
 
 
 def another(name, default):
     """A value of the field that is not its default, and long in decimals where it can be."""
     special = {"eps": 0.1 + 0.2, "K": K, "pixelSize": (0.1, 0.3), "directions": DIR_ROWS | DIR_COLS}
-    special |= {"noise": NoiseModel(1e-3, -1e-4, 1.425e-3, correlation=1.7), "minSignificance": 1e-300}
+    special |= {
+        "jumpThreshold": 0.1 + 0.7,
+        "noise": NoiseModel(1e-3, -1e-4, 1.425e-3, correlation=1.7),
+        "minSignificance": 1e-300,
+    }
     if name in special:
         return special[name]
     if isinstance(default, bool):
@@ -47,7 +52,7 @@ def another(name, default):
     return default / 3
 
 
-OTHER = {name: another(name, default) for name, default in vars(ScanLineParams()).items()}
+OTHER = {name: another(name, default) for name, default in DEFAULTS.items()}
 
 
 def accessor(kind, name):
@@ -108,6 +113,30 @@ def test_images_too_large_to_count_are_refused(function):
             function(huge)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"jumpThreshold": 0.2}, {"creaseThreshold": 91.0}, {"hysteresis": 0.5}, {"minLength": 30}, {"dynamic": True}],
+)
+def test_one_way_from_strengths_to_edges(scene, options):
+    noisy = scene + np.random.default_rng(0).normal(0, 0.001, scene.shape)
+    expected = detectEdges(noisy, K=K, **options)
+    strength = edgeStrength(noisy, K=K)
+    np.testing.assert_array_equal(thinEdges(selectEdges(strength, **options)), expected)
+    edges, found = detectEdgesWithStrength(noisy, K=K, **options)
+    np.testing.assert_array_equal(edges, expected)
+    assert isinstance(found, EdgeStrength)
+    for one, other in zip(found, strength, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_edges_with_strength_run_the_scan_lines_once(scene, monkeypatch):
+    calls = []
+    kernel = rangeedge.detector.measure_strength
+    monkeypatch.setattr("rangeedge.detector.measure_strength", lambda *args: calls.append(args) or kernel(*args))
+    detectEdgesWithStrength(scene, K=K)
+    assert len(calls) == 1
+
+
 def test_detect_edges_is_strength_selection_thinning(scene):
     strength = edgeStrength(scene, K=K, noise=0.001)
     jump = np.where(strength.kind & EDGE_OCCLUDING, strength.jump, np.float32(0))
@@ -127,7 +156,7 @@ def test_stray_crease_pixels_do_not_count_nor_jumps_on_the_farther_side():
     crease[1, 3:5] = 40
     jump[8] = jump[7] = 1
     kind[7], kind[8] = EDGE_OCCLUDING | EDGE_JUMP, EDGE_OCCLUDED | EDGE_JUMP
-    edges = selected_of(EdgeStrength(jump, crease, kind, jump), Selection(minLength=1).checked("test"))
+    edges = selectEdges(EdgeStrength(jump, crease, kind, jump), minLength=1)
     expected = np.zeros((9, 9), np.uint8)
     expected[4:6, 1:8] = expected[7] = 255
     np.testing.assert_array_equal(edges, expected)
@@ -138,8 +167,8 @@ def test_stray_creases_do_not_count_at_no_threshold_either(creaseThreshold):
     nothing, crease = np.zeros((2, 9, 9), np.float32)
     crease[4:6, 1:8] = 1
     crease[1, 3:5] = 1
-    selection = Selection(creaseThreshold=creaseThreshold, minLength=1).checked("test")
-    edges = selected_of(EdgeStrength(nothing, crease, nothing.astype(np.uint8), nothing), selection)
+    strength = EdgeStrength(nothing, crease, nothing.astype(np.uint8), nothing)
+    edges = selectEdges(strength, creaseThreshold=creaseThreshold, minLength=1)
     assert not edges[1].any()
     assert edges[4:6, 1:8].all()
 
@@ -238,7 +267,7 @@ def test_errors_name_detect_edges(scene, options, message):
 
 @pytest.mark.parametrize("options", [{"creaseThreshold": -1}, {"minLength": 0}, {"dynamic": 1}])
 def test_selection_is_checked_before_anything_is_computed(scene, detector, options, monkeypatch):
-    monkeypatch.setattr("rangeedge.detector.strength_of", lambda *_: pytest.fail("computed"))
+    monkeypatch.setattr("rangeedge.detector.measured_frame", lambda *_: pytest.fail("computed"))
     with pytest.raises(rangeedge.error, match=f"detectEdges: `{next(iter(options))}`"):
         detectEdges(scene, **options)
     with pytest.raises(rangeedge.error, match=f"detectEdges: `{next(iter(options))}`"):
@@ -275,9 +304,10 @@ def test_method_takes_the_options_of_the_function():
     function, method = (inspect.signature(f).parameters for f in (detectEdges, ScanLineDetector.detectEdges))
     for name, parameter in method.items():
         if name != "self":
-            assert function[name].default == parameter.default
+            assert parameter.default in (function[name].default, ...)  # ... is the detector's own
             assert function[name].kind is parameter.kind
-    assert set(function) - set(method) == set(FIELDS)
+            assert function[name].annotation == parameter.annotation
+    assert set(function) - set(method) == set(SCAN_LINES)
 
 
 def test_parameters_act(scene, detector):
@@ -292,12 +322,12 @@ def test_parameters_act(scene, detector):
 def test_every_field_is_set_and_got():
     assert set(OTHER) == set(FIELDS)
     detector = createScanLineDetector()
-    same(get_all(detector), vars(ScanLineParams()))
+    same(get_all(detector), DEFAULTS)
     for name, value in OTHER.items():
         getattr(detector, accessor("set", name))(value)
         got = getattr(detector, accessor("get", name))()
         assert np.array_equal(got, value), name
-        assert not np.array_equal(got, getattr(ScanLineParams(), name)), name
+        assert not np.array_equal(got, DEFAULTS[name]), name
     same(get_all(detector), OTHER)
 
 
@@ -308,8 +338,8 @@ def test_accessors_are_documented():
             first, _, text = method.__doc__.partition("\n\n")
             assert first in (f"get{name[0].upper()}{name[1:]}() -> retval", f"{accessor('set', name)}({name}) -> None")
             assert len(text) > 20, name
-            assert text.split()[0] in ScanLineParams.__doc__
-    assert ScanLineDetector.setMaxShift.__qualname__ == "ScanLineDetector.setMaxShift"
+            assert " ".join(text.split()) in " ".join(detectEdges.__doc__.split())
+            assert inspect.signature(method).return_annotation is not inspect.Signature.empty
 
 
 def test_a_refused_value_leaves_the_old_one(detector):
@@ -339,11 +369,37 @@ def test_only_parameters_make_a_detector(params):
         createScanLineDetector(params)
 
 
-@pytest.mark.parametrize("options", [{"K": np.eye(4)}, {"noise": -1}, {"pixelSize": (1, 2, 3)}])
+@pytest.mark.parametrize(
+    "options", [{"K": np.eye(4)}, {"noise": -1}, {"noise": np.ones((2, 2), bool)}, {"pixelSize": (1, 2, 3)}]
+)
 def test_parameters_that_wait_for_an_image_are_checked_at_once(options):
     name = next(iter(options))
-    with pytest.raises(rangeedge.error, match=f"createScanLineDetector: `{name}` must be"):
-        createScanLineDetector(ScanLineParams(**options))
+    with pytest.raises(rangeedge.error, match=f"ScanLineParams: `{name}` must be"):
+        ScanLineParams(**options)
+
+
+@pytest.mark.parametrize(
+    ("name", "way_out"),
+    [("epsFactor", r"call setEpsFactor\(epsFactor\)"), ("threshold", "its parameters have setters")],
+)
+def test_a_misspelt_attribute_is_refused(detector, name, way_out):
+    with pytest.raises(AttributeError, match=f"ScanLineDetector has no attribute '{name}' to set; {way_out}"):
+        setattr(detector, name, 3)
+
+
+def test_thresholds_are_the_detector_s_own_and_yield_for_a_frame(scene, detector):
+    def thin(**options):
+        return detectEdges(scene, K=K, noise=0.001, **options)
+
+    detector.setJumpThreshold(np.inf)
+    detector.setCreaseThreshold(40)
+    detector.setMinLength(9)
+    own = {"jumpThreshold": np.inf, "creaseThreshold": 40, "minLength": 9}
+    np.testing.assert_array_equal(detector.detectEdges(scene), thin(**own))
+    assert thin(**own).any()
+    np.testing.assert_array_equal(detector.detectEdges(scene, None), thin(**{**own, "jumpThreshold": None}))
+    np.testing.assert_array_equal(detector.detectEdges(scene, minLength=99), thin(**{**own, "minLength": 99}))
+    np.testing.assert_array_equal(detector.detectEdges(scene), thin(**own))
 
 
 def test_clear_empty_name_and_repr(detector):
@@ -351,7 +407,7 @@ def test_clear_empty_name_and_repr(detector):
     assert detector.getDefaultName() == "ScanLineDetector"
     assert repr(detector) == "ScanLineDetector(K=float64 array of shape (3, 3), noise=0.001)"
     detector.clear()
-    same(get_all(detector), vars(ScanLineParams()))
+    same(get_all(detector), DEFAULTS)
     assert repr(detector) == "ScanLineDetector()"
 
 
@@ -418,7 +474,7 @@ def test_a_file_may_be_written_by_hand(tmp_path, detector):
         "%YAML:1.0\n---\nScanLineDetector:\n   eps: 1\n   pixelSize: [ 2, 0.5 ]\n   noise: 3\n   maxGap: 2\n"
     )
     detector.load(path)
-    same(get_all(detector), {**vars(ScanLineParams()), "eps": 1.0, "pixelSize": (2.0, 0.5), "noise": 3.0, "maxGap": 2})
+    same(get_all(detector), {**DEFAULTS, "eps": 1.0, "pixelSize": (2.0, 0.5), "noise": 3.0, "maxGap": 2})
 
 
 BAD_NODES = {
@@ -491,7 +547,7 @@ def test_a_truncated_file_is_an_error_or_whole(tmp_path, suffix):
         try:
             other.load(cut)
         except rangeedge.error:
-            same(get_all(other), vars(ScanLineParams()))
+            same(get_all(other), DEFAULTS)
         else:  # nothing is missing but the end of the last line
             assert size > len(content) - 20
             same(get_all(other), OTHER)

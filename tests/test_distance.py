@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge._constants import SALIENCE_ADDITIVE, SALIENCE_MULTIPLICATIVE
+from rangeedge.constants import SALIENCE_ADDITIVE, SALIENCE_MULTIPLICATIVE
 from rangeedge.distance import (
     distanceTransform,
     distanceTransformWithLabels,

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge._constants import (
+from rangeedge.constants import (
     EDGE_BOUNDARY,
     EDGE_CONCAVE,
     EDGE_CONVEX,

@@ -11,7 +11,7 @@ import pytest
 from scipy.ndimage import binary_dilation, distance_transform_edt
 
 import rangeedge
-from rangeedge._constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
+from rangeedge.constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
 from rangeedge.evaluation import (
     TRUTH_AMBIGUOUS,
     TRUTH_CONCAVE,

@@ -5,7 +5,8 @@ import pytest
 
 import rangeedge
 from rangeedge import CREASE_MAX, edgePoints, edgeStrength
-from rangeedge.geometry import range_frame
+from rangeedge.frame import read_frame
+from rangeedge.options import ScanLineParams
 from rangeedge.synthetic import (
     Camera,
     box,
@@ -24,6 +25,10 @@ NAN = np.nan
 K = np.array([[180.0, 0.0, 61.3], [0, 170.0, 44.2], [0, 0, 1]])
 NAMES = ("jump", "crease", "kind", "significance")
 NOISE = 0.001
+
+
+def frame_of(src, mask=None, **geometry):
+    return read_frame(src, ScanLineParams(**geometry), mask)
 
 
 def scene():
@@ -170,7 +175,7 @@ def test_an_oblong_grid_sees_the_same_roof():
 def test_depths_of_a_camera_are_positive_and_finite(bad):
     z = np.full((7, 9), 1.5)
     z[3, 4] = bad
-    valid = range_frame("f", z, K=K).valid
+    valid = frame_of(z, K=K).valid
     assert valid[3, 4] == 0
     assert valid.sum() == 62
 
@@ -180,14 +185,14 @@ def test_depths_of_a_camera_are_positive_and_finite(bad):
 def test_values_of_a_grid_are_finite(value, valid, height):
     z = np.full((7, 9), 1.5)
     z[3, 4] = value
-    assert range_frame("f", z, heightMap=height).valid[3, 4] == valid
+    assert frame_of(z, heightMap=height).valid[3, 4] == valid
 
 
 def test_integers_are_positive():
     z = np.array([[0, 1, -3, 32767]], np.int16)
-    assert range_frame("f", z).valid.tolist() == [[0, 1, 0, 1]]
-    assert range_frame("f", z, K=K).valid.tolist() == [[0, 1, 0, 1]]
-    np.testing.assert_allclose(range_frame("f", z).depth[0, [1, 3]], [0.001, 32.767], rtol=1e-6)
+    assert frame_of(z).valid.tolist() == [[0, 1, 0, 1]]
+    assert frame_of(z, K=K).valid.tolist() == [[0, 1, 0, 1]]
+    np.testing.assert_allclose(frame_of(z).depth[0, [1, 3]], [0.001, 32.767], rtol=1e-6)
 
 
 @pytest.mark.parametrize("coordinate", [0, 1, 2])
@@ -195,35 +200,35 @@ def test_integers_are_positive():
 def test_points_are_finite_in_every_coordinate(coordinate, bad):
     points = np.random.default_rng(4).normal(size=(5, 6, 3)) + np.array([0, 0, 5])
     points[2, 3, coordinate] = bad
-    valid = range_frame("f", points).valid
+    valid = frame_of(points).valid
     assert valid[2, 3] == 0
     assert valid.sum() == 29
 
 
 def test_the_depth_of_a_frame_is_along_the_viewing_axis(pinhole, grid):
-    np.testing.assert_allclose(range_frame("f", pinhole.depth, K=K).depth, pinhole.depth)
-    np.testing.assert_allclose(range_frame("f", pinhole.points).depth, pinhole.depth)
-    np.testing.assert_allclose(range_frame("f", grid.depth).depth, grid.depth)
-    np.testing.assert_allclose(range_frame("f", grid.points).depth, grid.depth)
+    np.testing.assert_allclose(frame_of(pinhole.depth, K=K).depth, pinhole.depth)
+    np.testing.assert_allclose(frame_of(pinhole.points).depth, pinhole.depth)
+    np.testing.assert_allclose(frame_of(grid.depth).depth, grid.depth)
+    np.testing.assert_allclose(frame_of(grid.points).depth, grid.depth)
 
 
 # What kind of scanner took the points.
 
 
 def test_projection_is_recognised(pinhole, grid):
-    assert range_frame("f", pinhole.points).projective
-    assert not range_frame("f", grid.points).projective
-    assert range_frame("f", noisy(pinhole.points)).projective
-    assert not range_frame("f", grid.points + np.array([0.3, 0.2, 0])).projective
-    assert not range_frame("f", grid.points, heightMap=True).projective
+    assert frame_of(pinhole.points).projective
+    assert not frame_of(grid.points).projective
+    assert frame_of(noisy(pinhole.points)).projective
+    assert not frame_of(grid.points + np.array([0.3, 0.2, 0])).projective
+    assert not frame_of(grid.points, heightMap=True).projective
 
 
 def test_a_scanner_with_mirrors_counts_as_projective():
     camera = perceptronCamera()
     coarse = Camera((64, 64), lambda x, y: camera.rays(8 * x + 3.5, 8 * y + 3.5), {}, 450.0)
     for seed in range(3):
-        assert range_frame("f", renderScene(polyhedraScene(seed, coarse), coarse).points).projective
-    assert range_frame("f", renderScene([plane((0, 0, 450), (0.3, 0.2, -1))], coarse).points).projective
+        assert frame_of(renderScene(polyhedraScene(seed, coarse), coarse).points).projective
+    assert frame_of(renderScene([plane((0, 0, 450), (0.3, 0.2, -1))], coarse).points).projective
 
 
 @pytest.mark.parametrize("shape", [(1, 1, 3), (1, 5, 3), (5, 1, 3), (2, 2, 3), (1, 2, 4)])
@@ -246,7 +251,7 @@ def test_scan_lines_may_fold_back_at_occlusions():
     x = np.concatenate([np.linspace(0, 1, 30), np.linspace(0.9, 1.9, 30)])
     z = np.concatenate([np.full(30, 2.0), np.full(30, 1.0)])
     points = np.stack([np.tile(x, (5, 1)), np.tile(np.arange(5.0)[:, None], (1, 60)), np.tile(z, (5, 1))], -1)
-    frame = range_frame("f", points)
+    frame = frame_of(points)
     if not frame.projective:
         strength = edgeStrength(points, noise=0.001, directions=1)
         assert (strength.jump[:, 29] > 0).all()
@@ -258,35 +263,13 @@ def test_the_frame_does_not_share_what_it_changes(pinhole):
     z = pinhole.depth.copy()
     mask = np.zeros(z.shape, np.uint8)
     for kwargs in (dict(heightMap=True), dict(K=K), dict()):
-        range_frame("f", z, mask=mask, **kwargs)
+        frame_of(z, mask=mask, **kwargs)
         assert np.array_equal(z, pinhole.depth)
 
 
-def test_errors_name_the_function():
-    with pytest.raises(rangeedge.error, match="someFunction: `src` must be"):
-        range_frame("someFunction", np.zeros(3))
-    with pytest.raises(rangeedge.error, match="someFunction: `mask` must be"):
-        range_frame("someFunction", np.zeros((3, 3)), mask=np.zeros((3, 4), np.uint8))
-
-
-def test_points_left_out_do_not_turn_the_viewing_axis():
-    z = np.where(np.arange(60) < 30, 1.0, 1.2) * np.ones((50, 1))
-    K = np.array([[80.0, 0, 29.5], [0, 80, 24.5], [0, 0, 1]])
-    v, u = np.mgrid[:50, :60]
-    points = np.dstack([(u - 29.5) / 80 * z, (v - 24.5) / 80 * z, z])
-    expected = edgeStrength(z, K=K, noise=0.001).jump.max()
-    nothing, behind = points.copy(), points.copy()
-    nothing[3, 4] = 0
-    behind[3, 4] = (0.1, 0.1, -1)
-    mask = np.ones(z.shape, np.uint8)
-    mask[3, 4] = 0
-    for src, inside in ((nothing, None), (nothing, mask), (behind, mask)):
-        assert edgeStrength(src, noise=0.001, mask=inside).jump.max() == pytest.approx(expected, rel=1e-6)
-
-
-def test_masked_arrays_and_whole_heights_are_refused():
-    heights = np.ma.masked_equal(np.arange(400.0).reshape(20, 20), 7)
-    with pytest.raises(rangeedge.error, match=r"edgeStrength: `src` must be .* got a masked array"):
-        edgeStrength(heights, heightMap=True)
-    with pytest.raises(rangeedge.error, match="edgeStrength: `src` must be heights as floats"):
-        edgeStrength(np.arange(400, dtype=np.int16).reshape(20, 20), heightMap=True)
+@pytest.mark.parametrize("function", [rangeedge.estimateNoise, edgeStrength, rangeedge.segmentRegionsWithStats])
+def test_errors_name_the_function(function):
+    with pytest.raises(rangeedge.error, match=rf"{function.__name__}: `src` must be"):
+        function(np.zeros(3))
+    with pytest.raises(rangeedge.error, match=rf"{function.__name__}: `mask` must be"):
+        function(np.zeros((3, 3)), mask=np.zeros((3, 4), np.uint8))

@@ -1,15 +1,11 @@
-"""The simulation of P§5: the dome, planes by hand, the paper's figures, the detector itself, the command."""
+"""The simulation of the paper, 5: the dome, planes by hand, the paper's figures, the detector itself."""
 
-import json
-import sys
-
-import cv2
 import numpy as np
 import pytest
 
 import rangeedge
 from rangeedge import optimality
-from rangeedge._constants import CREASE_MAX, CREASE_NORMAL
+from rangeedge.constants import CREASE_MAX, CREASE_NORMAL
 from rangeedge.optimality import (
     analyseOptimality,
     creaseAngle,
@@ -17,7 +13,6 @@ from rangeedge.optimality import (
     errorStatistics,
     estimationError,
     geodesicDome,
-    main,
     measureDetector,
 )
 
@@ -245,41 +240,6 @@ def test_detector_finds_nothing_in_a_plane():
     one = random_normals(3, 13)
     two = one + np.array([1e-9, 0, 0])
     assert np.isnan(measureDetector(one, two, 0.1)).all()
-
-
-# The command
-
-
-def test_command_prints_and_writes(tmp_path, capsys):
-    pytest.importorskip("matplotlib")
-    out = tmp_path / "new" / "folder"
-    assert main(["--frequency", "4", "--pairs", "3", "--sigma", "0", "--out", str(out)]) == 0
-    printed = capsys.readouterr().out
-    assert "CREASE_MAX     theory, all 5151 pairs: |E| 6.08 ± 7.23" in printed
-    assert "CREASE_NORMAL  theory, all 5151 pairs: |E| 0.00 ± 0.00" in printed
-    assert "detector, sigma 0" in printed
-    names = {"optimality.json", "figure6.png", *(f"figure6{panel}.png" for panel in "abcde")}
-    assert {path.name for path in out.iterdir()} == names
-    for name in names - {"optimality.json"}:
-        assert cv2.imread(str(out / name)).std() > 10
-    data = json.loads((out / "optimality.json").read_text())
-    assert data["theory"]["CREASE_MAX"]["statistics"]["mean"] == pytest.approx(analyseOptimality(4).statistics.mean)
-    assert [row["pairs"] for row in data["sample"]] == [3] * 4
-
-
-def test_command_says_what_plots_need(tmp_path, capsys, monkeypatch):
-    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
-    assert main(["--frequency", "3", "--pairs", "0", "--out", str(tmp_path)]) == 1
-    assert "pip install rangeedge[plot]" in capsys.readouterr().err
-    assert [path.name for path in tmp_path.iterdir()] == ["optimality.json"]
-
-
-@pytest.mark.parametrize("argv", [["--frequency", "1"], ["--frequency", "x"], ["--pairs", "-1"], ["--sigma", "-1"]])
-def test_command_refuses_bad_options(argv, capsys):
-    with pytest.raises(SystemExit) as exit_:
-        main(["--frequency", "3", "--pairs", "1", *argv])
-    assert exit_.value.code == 2
-    assert "usage" in capsys.readouterr().err
 
 
 # Bad arguments

@@ -348,7 +348,7 @@ def test_errors_of_segmentation(options, name):
 
 @pytest.mark.parametrize("options", [{"tolerance": 0}, {"minArea": 0}, {"separation": 1.0}])
 def test_parameters_are_checked_before_anything_is_computed(options, monkeypatch):
-    for name in ("noise_of", "found_edges"):
+    for name in ("measured_frame", "run_detector"):
         monkeypatch.setattr(f"rangeedge.regions.{name}", lambda *_: pytest.fail("computed"))
     with pytest.raises(rangeedge.error, match=f"`{next(iter(options))}`"):
         segmentRegions(np.ones((20, 30), np.float32), **options)

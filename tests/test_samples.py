@@ -28,7 +28,7 @@ PICTURES = {
 def from_samples(monkeypatch):
     monkeypatch.syspath_prepend(SAMPLES)
     yield
-    for name in ("common", *PICTURES):
+    for name in ("common", "figure6", *PICTURES):
         sys.modules.pop(name, None)
 
 
@@ -50,7 +50,7 @@ def image(tmp_path):
 
 
 def test_every_sample_is_tested():
-    assert {path.stem for path in SAMPLES.glob("*.py")} == {"common", *PICTURES}
+    assert {path.stem for path in SAMPLES.glob("*.py")} == {"common", "figure6", *PICTURES}
 
 
 @pytest.mark.parametrize("name", PICTURES)
@@ -118,3 +118,22 @@ def test_pipeline_heeds_the_depth_factor(image, tmp_path):
     one, other = ((tmp_path / name / "candidates.csv").read_text() for name in ("one", "other"))
     assert one == other
     assert one.count("\n") > 1
+
+
+def test_figure6_prints_and_draws(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    run("figure6", "--frequency", 4, "--pairs", 3, "--sigma", 0, "--out", tmp_path / "new" / "folder")
+    printed = capsys.readouterr().out
+    assert "CREASE_MAX     theory, all 5151 pairs: |E| 6.08 ± 7.23" in printed
+    assert "CREASE_NORMAL  theory, all 5151 pairs: |E| 0.00 ± 0.00" in printed
+    assert "CREASE_NORMAL  detector, sigma 0, 3 of 3 pairs" in printed
+    assert cv2.imread(str(tmp_path / "new" / "folder" / "figure6.png")).std() > 10
+
+
+@pytest.mark.parametrize("argv", [["--frequency", "1"], ["--frequency", "x"], ["--sigma", "-1"]])
+def test_figure6_refuses_bad_options(argv, capsys):
+    pytest.importorskip("matplotlib")
+    with pytest.raises(SystemExit) as exit_:
+        run("figure6", "--frequency", "3", "--pairs", "1", *argv)
+    assert exit_.value.code == 2
+    assert "usage" in capsys.readouterr().err

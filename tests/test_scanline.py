@@ -1,4 +1,4 @@
-"""Splitting of one scan line (P§4.1)."""
+"""Splitting of one scan line (paper, 4.1)."""
 
 import cv2
 import numpy as np
@@ -54,7 +54,7 @@ def barred(z, segments):
         # The worst sample is the first 4, off by 3/7; it joins the 4 on its right.
         (0.1, "0 1 2 3 | 4 4 4 4"),
         # With one more, samples 2 and 6 are both off by 1/2: the cut falls behind sample 2, and "3 4 4 4 4 4" remains,
-        # in which sample 4 is off by 2/5. The basic scheme splits too often (P§4.1).
+        # in which sample 4 is off by 2/5. The basic scheme splits too often (paper, 4.1).
         (0.1, "0 1 2 | 3 | 4 4 4 4 4"),
         (0.1, "4 4 4 | 4 4 | 3 2 1 0"),
         # A spike in the middle is the midpoint: 9 - t^2 is off by 8 on either side of it, then -3 at the last but one.

@@ -6,7 +6,7 @@ import pytest
 
 from rangeedge import error
 from rangeedge import synthetic as syn
-from rangeedge._constants import (
+from rangeedge.constants import (
     DIR_ALL,
     EDGE_BOUNDARY,
     EDGE_CONCAVE,
@@ -15,7 +15,7 @@ from rangeedge._constants import (
     EDGE_OCCLUDED,
     EDGE_OCCLUDING,
 )
-from rangeedge.scanners import perceptronPoints
+from rangeedge.io.calibration import perceptronPoints
 
 SMALL = np.array([[130.0, 0, 79.5], [0, 130.0, 59.5], [0, 0, 1]])
 CAMERAS = {

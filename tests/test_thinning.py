@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rangeedge
-from rangeedge._constants import THIN_ITERATIVE, THIN_LEE, THIN_SKELETON
+from rangeedge.constants import THIN_ITERATIVE, THIN_LEE, THIN_SKELETON
 from rangeedge.thinning import thinEdges
 
 METHODS = {"skeleton": THIN_SKELETON, "lee": THIN_LEE, "iterative": THIN_ITERATIVE}

@@ -26,8 +26,8 @@ from skimage.morphology import skeletonize
 from skimage.segmentation import watershed
 
 import rangeedge
-from rangeedge.bench import stages, timed
-from rangeedge.demo import rendered_scene
+from rangeedge.app.bench import stages, timed
+from rangeedge.app.demo import RenderedScene
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 DIRECTIONS = {"rows": 1, "columns": 2, "diagonals 45": 4, "diagonals 135": 8}
@@ -38,7 +38,7 @@ Call = Callable[[], Any]
 
 def frames() -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Depths in metres, float32 with NaN where there is none, and camera matrices."""
-    scene = rendered_scene()
+    scene = RenderedScene()
     found = {
         "rendered": (np.where(scene.src > 0, scene.src / np.float32(1000), np.float32("nan")), scene.geometry["K"])
     }

@@ -30,15 +30,10 @@ std::vector<Candidate> candidates_of(const BoundFrame& bound, const ScanLineOpti
     return std::visit([&](const auto& frame) { return find_candidates(frame, options, threads); }, bound.frame);
 }
 
+using Columns = nb::typed<nb::dict, nb::str, nb::any>;
+
 // One array a field, by the field's name.
-nb::typed<nb::dict, nb::str, nb::any> edge_candidates(const BoundFrame& frame, const ScanLineOptions& options,
-                                                      int threads) {
-    std::vector<Candidate> candidates;
-    {
-        nb::gil_scoped_release release;
-        candidates = candidates_of(frame, options, threads);
-        put_in_order(candidates);
-    }
+Columns columns(const std::vector<Candidate>& candidates) {
     nb::dict result;
     const auto add = [&](const char* name, auto member) {
         using E = std::decay_t<decltype(candidates[0].*member)>;
@@ -57,11 +52,40 @@ nb::typed<nb::dict, nb::str, nb::any> edge_candidates(const BoundFrame& frame, c
     return result;
 }
 
-void edge_strength(const BoundFrame& bound, const ScanLineOptions& options, int threads, const OutImage<float>& jump,
-                   const OutImage<float>& crease, const OutImage<std::uint8_t>& kind,
-                   const OutImage<float>& significance) {
-    combine(candidates_of(bound, options, threads), jump.data(), crease.data(), kind.data(), significance.data());
+Columns edge_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads) {
+    std::vector<Candidate> candidates;
+    {
+        nb::gil_scoped_release release;
+        candidates = candidates_of(frame, options, threads);
+        put_in_order(candidates);
+    }
+    return columns(candidates);
+}
+
+using Strengths = OutImage<float>;
+
+void fill(const BoundFrame& bound, const std::vector<Candidate>& candidates, const Strengths& jump,
+          const Strengths& crease, const OutImage<std::uint8_t>& kind, const Strengths& significance) {
+    combine(candidates, jump.data(), crease.data(), kind.data(), significance.data());
     std::visit([&](const auto& frame) { mark_boundary(frame, boundary_bit, kind.data()); }, bound.frame);
+}
+
+void edge_strength(const BoundFrame& frame, const ScanLineOptions& options, int threads, const Strengths& jump,
+                   const Strengths& crease, const OutImage<std::uint8_t>& kind, const Strengths& significance) {
+    fill(frame, candidates_of(frame, options, threads), jump, crease, kind, significance);
+}
+
+Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads,
+                                     const Strengths& jump, const Strengths& crease,
+                                     const OutImage<std::uint8_t>& kind, const Strengths& significance) {
+    std::vector<Candidate> candidates;
+    {
+        nb::gil_scoped_release release;
+        candidates = candidates_of(frame, options, threads);
+        fill(frame, candidates, jump, crease, kind, significance);
+        put_in_order(candidates);
+    }
+    return columns(candidates);
 }
 
 void keep_long_components(const Image<std::uint8_t>& edges, int min_length, const OutImage<std::uint8_t>& kept) {
@@ -82,6 +106,8 @@ void bind_edges(nb::module_& m) {
     m.def("edge_candidates", &edge_candidates, "frame"_a, "options"_a, "threads"_a);
     m.def("edge_strength", &edge_strength, "frame"_a, "options"_a, "threads"_a, array("jump"), array("crease"),
           array("kind"), array("significance"), Unlocked());
+    m.def("edge_strength_and_candidates", &edge_strength_and_candidates, "frame"_a, "options"_a, "threads"_a,
+          array("jump"), array("crease"), array("kind"), array("significance"));
     m.def("long_components", &keep_long_components, array("edges"), "min_length"_a, array("kept"), Unlocked());
 }
 

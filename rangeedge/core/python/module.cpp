@@ -8,6 +8,7 @@ void bind_image(nanobind::module_& m);
 void bind_edges(nanobind::module_& m);
 void bind_distance(nanobind::module_& m);
 void bind_regions(nanobind::module_& m);
+void bind_io(nanobind::module_& m);
 
 }  // namespace rangeedge::python
 
@@ -17,4 +18,5 @@ NB_MODULE(_core, m) {
     rangeedge::python::bind_edges(m);
     rangeedge::python::bind_distance(m);
     rangeedge::python::bind_regions(m);
+    rangeedge::python::bind_io(m);
 }

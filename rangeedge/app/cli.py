@@ -3,38 +3,21 @@
 from __future__ import annotations
 
 import argparse
-import inspect
 import json
 import os
 import re
 import sys
-from collections.abc import Callable, Sequence
-from dataclasses import fields
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
 
-from . import __version__
-from ._args import error
-from ._constants import (
-    CREASE_MAX,
-    CREASE_NORMAL,
-    DIR_ALL,
-    DIR_COLS,
-    DIR_DIAG45,
-    DIR_DIAG135,
-    DIR_ROWS,
-    FIT_INTERP,
-    FIT_LSQ,
-    MEASURE_ENDPOINT,
-    MEASURE_MIDPOINT,
-)
+from .. import __version__
+from .._check import error, named
+from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing, Option
 from .batch import detect_file, detectBatch, read_image
-from .edges import ScanLineParams
-from .noise import NoiseModel
-from .regions import Growing, growRegions
 from .results import (
     EDGE_FILES,
     REGION_FILES,
@@ -45,8 +28,6 @@ from .results import (
     region_files,
     write_folder,
 )
-from .seeds import extractSeeds
-from .selection import Selection
 
 _INPUT = """A range image: 16-bit or float PNG, TIFF, PGM, EXR, PFM, NPY, NPZ, organized PCD or PLY,
 or a file of an ABW, Perceptron or Technical Arts scanner. With a pinhole camera give -K; without, the image is
@@ -69,14 +50,6 @@ Run it again after an interruption, and it does what is missing.""",
     "bench": """examples:
   rangeedge bench
   rangeedge bench depth.png -K 525,525,319.5,239.5 --json""",
-}
-
-_GEOMETRY = ("K", "pixelSize", "heightMap", "depthFactor")
-_DIRECTIONS = {"rows": DIR_ROWS, "cols": DIR_COLS, "diag45": DIR_DIAG45, "diag135": DIR_DIAG135, "all": DIR_ALL}
-_CHOICES = {
-    "fit": {"lsq": FIT_LSQ, "interp": FIT_INTERP},
-    "measure": {"midpoint": MEASURE_MIDPOINT, "endpoint": MEASURE_ENDPOINT},
-    "crease": {"max": CREASE_MAX, "normal": CREASE_NORMAL},
 }
 
 
@@ -115,7 +88,7 @@ def _parser() -> argparse.ArgumentParser:
     segment.add_argument("image", metavar="IMAGE", help=_INPUT)
     _add_out(segment)
     _add_geometry(segment)
-    _add_growing(segment)
+    _add_options(segment, "how regions grow", Growing.options)
     _add_detector(segment)
 
     batch = _command(commands, "batch", _batch, "find the edges of many range images")
@@ -172,18 +145,8 @@ def _add_out(parser: argparse.ArgumentParser, more: str = "files of the same nam
 def _add_geometry(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("geometry of the image")
     projection = group.add_mutually_exclusive_group()
-    projection.add_argument(
-        "-K", type=_camera, metavar="FX,FY,CX,CY", help="pinhole camera, in pixels; values are depths"
-    )
-    projection.add_argument(
-        "--pixel-size",
-        type=_pixel_size,
-        metavar="DX[,DY]",
-        dest="pixelSize",
-        help="spacing of a regular grid, in the unit of its values (default: 1)",
-    )
-    _add_field(group, "heightMap")
-    _add_field(group, "depthFactor")
+    for name, option in GEOMETRY.items():
+        _add_option(projection if name in ("K", "pixelSize") else group, option)
     group.add_argument("--mask", type=_mask, metavar="FILE", help="8-bit image, not 0 where pixels are used")
     group.add_argument(
         "--calibration", type=int, choices=(1, 2), help="of an ABW scanner (default: by the file's name)"
@@ -191,128 +154,64 @@ def _add_geometry(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_detector(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("which edges are kept")
-    defaults = Selection()._asdict()
-    for name, kind, text in (
-        ("jumpThreshold", float, "least jump, a length (default: any beyond the noise)"),
-        ("creaseThreshold", float, "least crease, in degrees (default: %(was)s)"),
-        (
-            "hysteresis",
-            float,
-            "share of the thresholds that edges connected to strong ones must reach (default: %(was)s)",
-        ),
-        ("minLength", int, "shorter edges are removed, in pixels (default: %(was)s)"),
-        ("dynamic", bool, "remove chains that do not stand out of the population (Venkatesh and Rosin)"),
-    ):
-        _add_option(group, name, kind, text.replace("%(was)s", str(defaults[name])))
-    group = parser.add_argument_group("how edges are found (the fields of ScanLineParams)")
-    for field in fields(ScanLineParams):
-        if field.name not in _GEOMETRY:
-            _add_field(group, field.name)
+    _add_options(parser, "which edges are kept", SELECTION)
+    own = {name: option for name, option in SCAN_LINES.items() if name not in GEOMETRY}
+    _add_options(parser, "how edges are found (the fields of ScanLineParams)", own)
 
 
-def _add_growing(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("how regions grow")
-    texts = {**_documented(extractSeeds), **_documented(growRegions)}
-    seeding = inspect.signature(extractSeeds).parameters
-    for name, default in Growing()._asdict().items():
-        text = f"{'Seeds: ' if name in seeding else ''}{texts.get(name, '')} (default: {default:g})"
-        _add_option(group, name, type(default), text)
+def _add_options(parser: argparse.ArgumentParser, title: str, options: Mapping[str, Option]) -> None:
+    group = parser.add_argument_group(title)
+    for option in options.values():
+        _add_option(group, option)
 
 
-def _add_field(group: Any, name: str) -> None:
-    """The option of a field of ScanLineParams, with the help of its docstring."""
-    field = next(f for f in fields(ScanLineParams) if f.name == name)
-    text = _documented(ScanLineParams).get(name, "")
-    if name == "noise":
-        text = "deviation of the values: a length, or A,B,C[,CORRELATION] for a + b z + c z^2, or kinect1, kinect2"
-        group.add_argument("--noise", type=_noise, metavar="NOISE", help=f"{text} (default: estimated)")
-    elif name == "directions":
-        text = f"scan lines, joined by commas: {', '.join(_DIRECTIONS)} (default: all)"
-        group.add_argument("--directions", type=_directions, metavar="LIST", help=text)
-    elif name in _CHOICES:
-        default = next(key for key, value in _CHOICES[name].items() if value == field.default)
-        words = re.sub(r"\b(FIT|MEASURE|CREASE)_(\w+)", lambda m: m[2].lower(), text)
-        group.add_argument(
-            f"--{name}", type=_choice(name), metavar="|".join(_CHOICES[name]), help=f"{words} (default: {default})"
-        )
+def _add_option(group: Any, option: Option) -> None:
+    flag, text = _flag(option.name), _help(option)
+    if option.read is bool:
+        group.add_argument(flag, action="store_true", dest=option.name, help=text)
+    elif option.choices:
+        read = _reader(lambda word: _chosen(option, word))
+        group.add_argument(flag, type=read, metavar="|".join(option.choices), dest=option.name, help=text)
     else:
-        kind = {"bool": bool, "int": int}.get(str(field.type), float)
-        default = "" if kind is bool or field.default is None else f" (default: {field.default:g})"
-        _add_option(group, name, kind, text + default)
+        group.add_argument(flag, type=_reader(option.read), metavar=option.metavar, dest=option.name, help=text)
 
 
-def _add_option(group: Any, name: str, kind: type, text: str) -> None:
-    flag = "--" + _kebab(name)
-    if kind is bool:
-        group.add_argument(flag, action="store_true", dest=name, help=text)
-    else:
-        group.add_argument(flag, type=kind, metavar="N" if kind is int else "X", dest=name, help=text)
+def _flag(name: str) -> str:
+    return "-K" if name == "K" else "--" + re.sub(r"([A-Z])", lambda m: "-" + m[1].lower(), name)
 
 
-def _kebab(name: str) -> str:
-    return re.sub(r"([A-Z])", lambda m: "-" + m[1].lower(), name)
+def _help(option: Option) -> str:
+    """What the option means, in the words of the command line."""
+    if option.flagged:
+        return option.flagged
+    text, default = option.text, option.default
+    for name in (*DETECTION, *Growing.options):
+        text = text.replace(f"`{name}`", _flag(name))
+    for word, value in option.choices.items():
+        text = text.replace(next(name for name, other in option.constants.items() if other == value), word)
+        default = word if value == option.default else default
+    known = [option.unit] if option.unit else []
+    if default is not None and default is not False:
+        known.append(f"default: {default if option.choices else f'{default:g}'}")
+    return text.replace("``numpy.inf``", "inf").replace("%", "%%") + (f" ({'; '.join(known)})" if known else "")
 
 
-def _documented(documented: Any) -> dict[str, str]:
-    """What the numpydoc section `Parameters` says of each parameter, options under their names here."""
-    section = (inspect.getdoc(documented) or "").partition("Parameters\n")[2].partition("\n\n")[0]
-    found = re.findall(r"^(\w+) : .*\n((?:    .*\n?)+)", section, re.MULTILINE)
-    words = {name: " ".join(text.split()).replace("%", "%%") for name, text in found}
-    return {
-        name: re.sub(r"`(\w+)`", lambda m: "--" + _kebab(m[1]) if m[1] in words else m[1], text)
-        for name, text in words.items()
-    }
+def _reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
+    """A type of argparse, which wants complaints in an exception of its own."""
+
+    def reading(text: str) -> Any:
+        try:
+            return read(text)
+        except ValueError as problem:
+            raise argparse.ArgumentTypeError(getattr(problem, "err", str(problem))) from None
+
+    return reading
 
 
-def _numbers(text: str, counts: Sequence[int], form: str) -> list[float]:
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) not in counts:
-        raise argparse.ArgumentTypeError(f"must be {form}, got {text!r}")
-    return numbers
-
-
-def _camera(text: str) -> np.ndarray:
-    fx, fy, cx, cy = _numbers(text, (4,), "four numbers fx,fy,cx,cy")
-    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
-
-
-def _pixel_size(text: str) -> float | tuple[float, ...]:
-    numbers = _numbers(text, (1, 2), "one length or two, dx,dy")
-    return numbers[0] if len(numbers) == 1 else tuple(numbers)
-
-
-def _noise(text: str) -> float | NoiseModel:
-    if text in ("kinect1", "kinect2"):
-        return getattr(NoiseModel, text)()
-    numbers = _numbers(text, (1, 3, 4), "a length, a,b,c or a,b,c,correlation, kinect1 or kinect2")
-    if len(numbers) == 1:
-        return numbers[0]
-    try:
-        return NoiseModel(*numbers)
-    except error as problem:
-        raise argparse.ArgumentTypeError(problem.err) from None
-
-
-def _directions(text: str) -> int:
-    chosen = 0
-    for word in text.split(","):
-        if word not in _DIRECTIONS:
-            raise argparse.ArgumentTypeError(f"must be of {', '.join(_DIRECTIONS)}, joined by commas, got {text!r}")
-        chosen |= _DIRECTIONS[word]
-    return chosen
-
-
-def _choice(name: str) -> Callable[[str], int]:
-    def chosen(text: str) -> int:
-        if text not in _CHOICES[name]:
-            raise argparse.ArgumentTypeError(f"must be {' or '.join(_CHOICES[name])}, got {text!r}")
-        return _CHOICES[name][text]
-
-    return chosen
+def _chosen(option: Option, word: str) -> int:
+    if word not in option.choices:
+        raise ValueError(f"must be {' or '.join(option.choices)}, got {word!r}")
+    return option.choices[word]
 
 
 def _mask(text: str) -> np.ndarray:
@@ -367,7 +266,7 @@ def _batch(args: argparse.Namespace) -> int:
 def _demo(args: argparse.Namespace) -> int:
     from . import demo
 
-    scene = demo.real_scene() if args.real else demo.rendered_scene()
+    scene = demo.RealScene() if args.real else demo.RenderedScene()
     options = _options(args)
     found = find_edges(scene.src, **scene.geometry, **options)
     files = {**edge_files(found, scene.title, options), **scene.files(found)}
@@ -379,15 +278,16 @@ def _demo(args: argparse.Namespace) -> int:
     return 0
 
 
+@named("bench")
 def _bench(args: argparse.Namespace) -> int:
     from .bench import benchmark, table
-    from .demo import rendered_scene
+    from .demo import RenderedScene
 
     options = _options(args)
     if args.image is None and options:
-        given = " ".join("-K" if name == "K" else "--" + _kebab(name) for name in options)
-        raise error("bench", f"{given} describes an IMAGE, but there is none; the built-in scene has its own")
-    image = rendered_scene() if args.image is None else read_image(args.image, options)
+        given = " ".join(map(_flag, options))
+        raise error(f"{given} describes an IMAGE, but there is none; the built-in scene has its own")
+    image = RenderedScene() if args.image is None else read_image(args.image, options)
     times = benchmark(image.src, repeat=args.repeat, **image.geometry)
     print(json.dumps(times, indent=2) if args.json else table(times))
     return 0

@@ -1,16 +1,17 @@
-"""How good edges and regions are: scores against ground truth."""
+"""How good an edge map is: scores against true edges."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from typing import Any
 
 import cv2
 import numpy as np
 
-from . import _args
-from ._constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
-from .distance import distanceTransformWithLabels
+from .. import _check
+from ..constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
+from ..distance import distanceTransformWithLabels
+from .counts import Counts, ratio
 
 # Classes of a typed truth map: what a pixel truly is.
 TRUTH_NONE = 0
@@ -25,25 +26,8 @@ _NOT_JUDGED = (TRUTH_NODATA, TRUTH_AMBIGUOUS, TRUTH_IGNORED)
 _CLASSES = (TRUTH_NONE, TRUTH_JUMP, TRUTH_CONVEX, TRUTH_CONCAVE, *_NOT_JUDGED)
 
 
-def _ratio(part: float, whole: float) -> float:
-    return part / whole if whole else float("nan")
-
-
-class _Counts:
-    """Counts that add up over frames: by ``a + b`` and by ``sum(scores)``."""
-
-    def __add__(self, other):
-        if type(other) is not type(self):
-            return NotImplemented
-        names = [field.name for field in fields(self)]
-        return replace(self, **{name: getattr(self, name) + getattr(other, name) for name in names})
-
-    def __radd__(self, other):
-        return self if other == 0 else NotImplemented
-
-
 @dataclass(frozen=True)
-class TypeScores(_Counts):
+class TypeScores(Counts):
     """Counts over the true edge pixels of one type; every derived value is NaN where nothing was counted."""
 
     target: int = 0  # true pixels that are judged
@@ -57,26 +41,26 @@ class TypeScores(_Counts):
     @property
     def recall(self) -> float:
         """Share of the true pixels that was found."""
-        return _ratio(self.found, self.target)
+        return ratio(self.found, self.target)
 
     @property
     def shift(self) -> float:
         """Mean distance from a found pixel to the nearest detected one, in pixels."""
-        return _ratio(self.shiftSum, self.found)
+        return ratio(self.shiftSum, self.found)
 
     @property
     def kind(self) -> float:
         """Share of the found pixels that carries the right kind."""
-        return _ratio(self.kindRight, self.labelled)
+        return ratio(self.kindRight, self.labelled)
 
     @property
     def strengthError(self) -> float:
         """Mean absolute error of the strength: degrees for creases, a length for jumps."""
-        return _ratio(self.strengthSum, self.measured)
+        return ratio(self.strengthSum, self.measured)
 
 
 @dataclass(frozen=True)
-class EdgeScores(_Counts):
+class EdgeScores(Counts):
     """Counts of `evaluateEdges` that add up over frames, and the values derived from them.
 
     ``sum(scores)`` over frames weighs every edge pixel alike. A value is NaN where nothing was counted for it.
@@ -107,12 +91,12 @@ class EdgeScores(_Counts):
     @property
     def precision(self) -> float:
         """Share of the detected pixels that is near a true edge."""
-        return _ratio(self.true, self.detected)
+        return ratio(self.true, self.detected)
 
     @property
     def recall(self) -> float:
         """Share of the true edge pixels that was found."""
-        return _ratio(self.found, self.target)
+        return ratio(self.found, self.target)
 
     @property
     def f(self) -> float:
@@ -137,33 +121,7 @@ class EdgeScores(_Counts):
         return ", ".join(f"{name} {value:.3f}" for name, value in values.items())
 
 
-@dataclass(frozen=True)
-class HooverScores(_Counts):
-    """Numbers of regions by `hooverScores`; they add up over frames, and are reported per frame."""
-
-    frames: int = 0
-    truth: int = 0  # true regions
-    found: int = 0  # regions of the segmentation
-    correct: int = 0  # true regions met by one region
-    over: int = 0  # true regions split into several
-    under: int = 0  # regions of the segmentation that cover several true ones
-    missed: int = 0  # true regions in none of these
-    noise: int = 0  # regions of the segmentation in none of these
-
-    @property
-    def perFrame(self) -> dict[str, float]:
-        """Mean number of every sort per frame, as Hoover's tables print it."""
-        return {f.name: _ratio(getattr(self, f.name), self.frames) for f in fields(self) if f.name != "frames"}
-
-    @property
-    def correctRate(self) -> float:
-        """Share of the true regions that is correct."""
-        return _ratio(self.correct, self.truth)
-
-    def __str__(self) -> str:
-        return ", ".join(f"{name} {value:.2f}" for name, value in self.perFrame.items())
-
-
+@_check.public
 def evaluateEdges(
     edges: np.ndarray,
     truth: np.ndarray,
@@ -221,6 +179,7 @@ def evaluateEdges(
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge.evaluation import TRUTH_CONVEX, evaluateEdges
     >>> truth = np.zeros((20, 20), np.uint8)
     >>> truth[:, 10] = TRUTH_CONVEX
     >>> edges = np.zeros((20, 20), np.uint8)
@@ -231,17 +190,16 @@ def evaluateEdges(
     >>> (scores + scores).frames
     2
     """
-    func = "evaluateEdges"
-    truth = _truth_map(func, truth)
+    truth = _truth_map(truth)
     shape = truth.shape
-    edges = _args.image8(func, "edges", edges, shape) != 0
-    tolerance = _args.number(func, "tolerance", tolerance, 0.0)
+    edges = _check.image8("edges", edges, shape) != 0
+    tolerance = _check.number("tolerance", tolerance, 0.0)
     not_judged = np.isin(truth, _NOT_JUDGED)
     if ignore is not None:
-        not_judged |= _args.image8(func, "ignore", ignore, shape) != 0
-    labels = None if kind is None else _classes_of(_args.image8(func, "kind", kind, shape))
-    creases = _strengths(func, "crease", crease, creaseTruth, shape)
-    jumps = _strengths(func, "jump", jump, jumpTruth, shape)
+        not_judged |= _check.image8("ignore", ignore, shape) != 0
+    labels = None if kind is None else _classes_of(_check.image8("kind", kind, shape))
+    creases = _strengths("crease", crease, creaseTruth, shape)
+    jumps = _strengths("jump", jump, jumpTruth, shape)
 
     is_edge = np.isin(truth, (TRUTH_JUMP, TRUTH_CONVEX, TRUTH_CONCAVE))
     judged = _distance(not_judged) > tolerance
@@ -277,6 +235,7 @@ def evaluateEdges(
     )
 
 
+@_check.public
 def prattFOM(edges: np.ndarray, truth: np.ndarray, alpha: float = 1 / 9) -> float:
     """Pratt's figure of merit of an edge map, 1 for a perfect one.
 
@@ -313,20 +272,22 @@ def prattFOM(edges: np.ndarray, truth: np.ndarray, alpha: float = 1 / 9) -> floa
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge.evaluation import prattFOM
     >>> truth = np.zeros((8, 8), np.uint8)
     >>> truth[:, 3] = 255
     >>> prattFOM(truth, truth), round(prattFOM(np.roll(truth, 1, axis=1), truth), 6)
     (1.0, 0.9)
     """
-    truth = _args.image8("prattFOM", "truth", truth) != 0
-    edges = _args.image8("prattFOM", "edges", edges, truth.shape) != 0
-    alpha = _args.number("prattFOM", "alpha", alpha, 0.0, above=True)
+    truth = _check.image8("truth", truth) != 0
+    edges = _check.image8("edges", edges, truth.shape) != 0
+    alpha = _check.number("alpha", alpha, 0.0, above=True)
     if not edges.any() or not truth.any():
         return float(edges.any() == truth.any())
     merit = 1 / (1 + alpha * _distance(truth)[edges] ** 2)
     return float(merit.sum() / max(edges.sum(), truth.sum()))
 
 
+@_check.public
 def baddeleyDelta(edges: np.ndarray, truth: np.ndarray, k: float = 2.0, cutoff: float | None = None) -> float:
     """Baddeley's distance between two edge maps, 0 for equal ones.
 
@@ -364,158 +325,28 @@ def baddeleyDelta(edges: np.ndarray, truth: np.ndarray, k: float = 2.0, cutoff: 
     Examples
     --------
     >>> import numpy as np
+    >>> from rangeedge.evaluation import baddeleyDelta
     >>> truth = np.zeros((8, 8), np.uint8)
     >>> truth[:, 3] = 255
     >>> baddeleyDelta(truth, truth), baddeleyDelta(np.roll(truth, 1, axis=1), truth, cutoff=4)
     (0.0, 1.0)
     """
-    truth = _args.image8("baddeleyDelta", "truth", truth) != 0
-    edges = _args.image8("baddeleyDelta", "edges", edges, truth.shape) != 0
-    k = _args.number("baddeleyDelta", "k", k, 1.0)
+    truth = _check.image8("truth", truth) != 0
+    edges = _check.image8("edges", edges, truth.shape) != 0
+    k = _check.number("k", k, 1.0)
     cutoff = float(np.hypot(*truth.shape)) / 10 if cutoff is None else cutoff
-    cutoff = _args.number("baddeleyDelta", "cutoff", cutoff, 0.0, above=True)
+    cutoff = _check.number("cutoff", cutoff, 0.0, above=True)
     difference = np.minimum(_distance(edges), cutoff) - np.minimum(_distance(truth), cutoff)
     return float((np.abs(difference) ** k).mean() ** (1 / k))
 
 
-def hooverScores(
-    labels: np.ndarray, truth: np.ndarray, *, T: float = 0.8, ignore: np.ndarray | None = None
-) -> HooverScores:
-    """Score a segmentation against true regions after Hoover et al.
-
-    hooverScores(labels, truth, *[, T[, ignore]]) -> scores
-
-    With |m & n| the overlap of region m of the segmentation and true region n,
-
-    - *correct*: m and n share at least T of either;
-    - *over*-segmented: true region n of which two or more m, each with at least T of itself in n, cover at least T;
-    - *under*-segmented: region m of which two or more n, each with at least T of itself in m, cover at least T;
-    - *missed*: true regions, and *noise*: regions of the segmentation, in none of these.
-
-    A region in several of them belongs to the one with the largest mean of its two shares, on a tie to the first.
-
-    Parameters
-    ----------
-    labels, truth : (H, W) integer arrays
-        Region of every pixel, in any numbering; 0 and negative numbers are no region.
-    T : float
-        The share that counts as covering, above 0.5 and up to 1.
-    ignore : (H, W) 8-bit or bool array, optional
-        Pixels to leave out (non-zero), such as those without a measurement or without truth.
-
-    Returns
-    -------
-    HooverScores
-        Numbers of regions: ``truth``, ``found``, ``correct``, ``over``, ``under``, ``missed``, ``noise``.
-
-    Raises
-    ------
-    rangeedge.error
-        On an argument of the wrong type, shape or range.
-
-    Notes
-    -----
-    A. Hoover et al., An experimental comparison of range image segmentation algorithms, PAMI 18(7), 1996.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> truth = np.repeat([1, 1, 1, 1, 2, 2, 2, 2], 8).reshape(8, 8)
-    >>> labels = np.repeat([1, 1, 5, 5, 7, 7, 7, 7], 8).reshape(8, 8)
-    >>> print(hooverScores(labels, truth))
-    truth 2.00, found 3.00, correct 1.00, over 1.00, under 0.00, missed 0.00, noise 0.00
-    """
-    func = "hooverScores"
-    truth = _label_image(func, "truth", truth)
-    labels = _label_image(func, "labels", labels, truth.shape)
-    T = _args.number(func, "T", T, 0.5, 1.0, above=True)
-    if ignore is not None:
-        keep = _args.image8(func, "ignore", ignore, truth.shape) == 0
-        labels, truth = labels[keep], truth[keep]
-
-    overlap, found_size, true_size = _overlaps(labels, truth)
-    true_share, found_share = overlap / true_size, overlap / found_size[:, None]
-    found_map = _Mapping(len(found_size))
-    true_map = _Mapping(len(true_size))
-
-    for m, n in zip(*np.nonzero((true_share >= T) & (found_share >= T)), strict=True):
-        measure = (true_share[m, n] + found_share[m, n]) / 2
-        found_map.assign(m, "correct", measure)
-        true_map.assign(n, "correct", measure)
-    for n in range(len(true_size)):
-        parts = np.flatnonzero(found_share[:, n] >= T)
-        covered = overlap[parts, n].sum()
-        if len(parts) >= 2 and covered / true_size[n] >= T:
-            measure = (covered / true_size[n] + covered / found_size[parts].sum()) / 2
-            if true_map.accepts(n, measure):
-                true_map.assign(n, "over", measure)
-                found_map.assign(parts, "over", measure)
-    for m in range(len(found_size)):
-        parts = np.flatnonzero(true_share[m] >= T)
-        covered = overlap[m, parts].sum()
-        if len(parts) >= 2 and covered / found_size[m] >= T:
-            measure = (covered / true_size[parts].sum() + covered / found_size[m]) / 2
-            if found_map.accepts(m, measure):
-                found_map.assign(m, "under", measure)
-                true_map.assign(parts, "under", measure)
-
-    return HooverScores(
-        frames=1,
-        truth=len(true_size),
-        found=len(found_size),
-        correct=true_map.count("correct"),
-        over=true_map.count("over"),
-        under=found_map.count("under"),
-        missed=true_map.count(""),
-        noise=found_map.count(""),
-    )
-
-
-class _Mapping:
-    """What each region of one image takes part in, and how well."""
-
-    def __init__(self, regions: int) -> None:
-        self._role = np.full(regions, "", "<U7")
-        self._measure = np.full(regions, -np.inf)
-
-    def accepts(self, region: int, measure: float) -> bool:
-        return bool(measure > self._measure[region])
-
-    def assign(self, regions: Any, role: str, measure: float) -> None:
-        self._role[regions] = role
-        self._measure[regions] = measure
-
-    def count(self, role: str) -> int:
-        return int((self._role == role).sum())
-
-
-def _overlaps(labels: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pixels shared by every pair of regions, and the sizes of either side's regions."""
-    found_ids, found = np.unique(np.maximum(labels.ravel(), 0), return_inverse=True)
-    true_ids, true = np.unique(np.maximum(truth.ravel(), 0), return_inverse=True)
-    table = np.bincount(found * len(true_ids) + true, minlength=len(found_ids) * len(true_ids))
-    table = table.reshape(len(found_ids), len(true_ids))
-    is_found, is_true = found_ids > 0, true_ids > 0
-    return table[np.ix_(is_found, is_true)], table.sum(1)[is_found], table.sum(0)[is_true]
-
-
-def _truth_map(func: str, truth: Any) -> np.ndarray:
-    truth = _args.image8(func, "truth", truth)
+def _truth_map(truth: Any) -> np.ndarray:
+    truth = _check.image8("truth", truth)
     unknown = np.setdiff1d(truth, _CLASSES)
     if unknown.size:
         got = f"class {unknown[0]}"
-        raise _args.fail(func, "truth", f"of the classes {_CLASSES}", got, cv2.Error.StsOutOfRange)
+        raise _check.fail("truth", f"of the classes {_CLASSES}", got, cv2.Error.StsOutOfRange)
     return truth
-
-
-def _label_image(func: str, name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
-    expected = "an integer array of shape (H, W)" if shape is None else f"an integer array of shape {shape}"
-    value = _args.array(func, name, value, expected)
-    if value.dtype.kind not in "iu":
-        raise _args.fail(func, name, expected, _args.described(value), cv2.Error.StsUnsupportedFormat)
-    if shape is not None and value.shape != shape:
-        raise _args.fail(func, name, expected, _args.described(value), cv2.Error.StsUnmatchedSizes)
-    return value.astype(np.int64)
 
 
 def _classes_of(kind: np.ndarray) -> dict[int, np.ndarray]:
@@ -528,17 +359,15 @@ def _classes_of(kind: np.ndarray) -> dict[int, np.ndarray]:
     }
 
 
-def _strengths(
-    func: str, name: str, strength: Any, truth: Any, shape: tuple[int, int]
-) -> tuple[np.ndarray, np.ndarray] | None:
+def _strengths(name: str, strength: Any, truth: Any, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray] | None:
     """Detected and true strengths, or None where neither is given."""
     if strength is None and truth is None:
         return None
     for key, value in ((name, strength), (f"{name}Truth", truth)):
         if value is None:
             other = f"{name}Truth" if key == name else name
-            raise _args.fail(func, key, f"given where `{other}` is", None)
-    return _args.image32f(func, name, strength, shape), _args.image32f(func, f"{name}Truth", truth, shape)
+            raise _check.fail(key, f"given where `{other}` is", None)
+    return _check.image32f(name, strength, shape), _check.image32f(f"{name}Truth", truth, shape)
 
 
 def _skeleton(edges: np.ndarray) -> np.ndarray:

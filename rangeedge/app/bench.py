@@ -10,18 +10,20 @@ from typing import Any
 import cv2
 import numpy as np
 
-from . import __version__
-from ._args import integer
-from .detector import detectEdges, selected_of
-from .distance import distanceTransform, salienceDistanceTransform
-from .edges import edgePoints, edgeStrength
-from .geometry import range_frame
-from .noise import estimateNoise
-from .seeds import extractSeeds
-from .selection import Selection, overallStrength
-from .thinning import thinEdges
+from .. import __version__
+from .._check import integer
+from ..detector import detectEdges, detectEdgesWithStrength
+from ..distance import distanceTransform, salienceDistanceTransform
+from ..edges import edgePoints, edgeStrength
+from ..frame import read_frame
+from ..noise import estimateNoise
+from ..options import GEOMETRY, ScanLineParams, parsed, takes
+from ..seeds import extractSeeds
+from ..selection import overallStrength, selectEdges
+from ..thinning import thinEdges
 
 
+@takes(GEOMETRY)
 def benchmark(src: np.ndarray, *, repeat: int = 20, mask: np.ndarray | None = None, **geometry: Any) -> dict[str, Any]:
     """Time the stages in turn, again and again, in one process.
 
@@ -45,7 +47,7 @@ def benchmark(src: np.ndarray, *, repeat: int = 20, mask: np.ndarray | None = No
     rangeedge.error
         On a bad argument.
     """
-    repeat = integer("benchmark", "repeat", repeat, 1)
+    repeat = integer("repeat", repeat, 1)
     times = timed(stages(src, mask, geometry), repeat)
     return {
         "width": src.shape[1],
@@ -68,12 +70,12 @@ def table(result: dict[str, Any]) -> str:
 
 def stages(src: np.ndarray, mask: np.ndarray | None, geometry: dict[str, Any]) -> dict[str, Callable[[], Any]]:
     """What is timed, by name; results of earlier stages are the input of later ones."""
-    depth = range_frame("benchmark", src, mask=mask, **geometry).depth
+    (params,) = parsed(geometry, ScanLineParams)
+    depth = read_frame(src, params, mask).depth
     grey = cv2.normalize(np.nan_to_num(depth), None, 0, 255, cv2.NORM_MINMAX, cv2.CV_8U)
     noise = estimateNoise(src, mask=mask, **geometry)
-    strength = edgeStrength(src, noise=noise, mask=mask, **geometry)
-    selection = Selection().checked("benchmark")
-    selected = selected_of(strength, selection)
+    _, strength = detectEdgesWithStrength(src, noise=noise, mask=mask, **geometry)
+    selected = selectEdges(strength)
     thin = thinEdges(selected)
     salience = overallStrength(strength.jump, strength.crease, max(float(strength.jump.max()), 1e-6))
     distance = distanceTransform(thin)
@@ -81,7 +83,7 @@ def stages(src: np.ndarray, mask: np.ndarray | None, geometry: dict[str, Any]) -
         "detectEdges": lambda: detectEdges(src, mask=mask, **geometry),
         "  estimateNoise": lambda: estimateNoise(src, mask=mask, **geometry),
         "  edgeStrength, noise given": lambda: edgeStrength(src, noise=noise, mask=mask, **geometry),
-        "  selection": lambda: selected_of(strength, selection),
+        "  selectEdges": lambda: selectEdges(strength),
         "  thinEdges": lambda: thinEdges(selected),
         "edgePoints, noise given": lambda: edgePoints(src, noise=noise, mask=mask, **geometry),
         "distanceTransform": lambda: distanceTransform(thin),

@@ -10,22 +10,24 @@ import os
 import shutil
 import uuid
 import zlib
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 
-from ._args import described, error
-from .detector import found_edges
-from .distance import distanceTransform
-from .draw import drawOverview, region_overview
-from .edges import EdgeStrength, ScanLineParams, frame_of, params_of, points_of
-from .geometry import RangeFrame
-from .noise import noise_of
-from .regions import Growing, described_regions, seeded_regions
-from .selection import Selection
+from .. import __version__
+from .._check import described, error, named
+from ..distance import distanceTransform
+from ..draw import drawOverview, region_overview
+from ..edges import EdgeStrength, measure_both
+from ..frame import Frame
+from ..noise import measured_frame
+from ..options import DETECTION, Growing, ScanLineParams, Selection, parsed, takes
+from ..regions import described_regions, seeded_regions
+from ..selection import select_strength
+from ..thinning import thinEdges
 
 _REPORT = "report.json"
 _LABELS = 65535  # that 16 bits hold
@@ -56,9 +58,7 @@ EDGE_FILES = {
 class EdgeResults(NamedTuple):
     """Everything that `detect` writes, as arrays."""
 
-    frame: RangeFrame
-    noise: Any
-    heightMap: bool
+    frame: Frame
     strength: EdgeStrength
     points: np.ndarray
     edges: np.ndarray
@@ -69,32 +69,22 @@ class EdgeResults(NamedTuple):
     def surface(self) -> np.ndarray:
         """The range image as pictures take it: float32, NaN without data, heights where it is a height map."""
         depth = self.frame.depth.astype(np.float32)
-        return -depth if self.heightMap else depth
+        return -depth if self.frame.heightMap else depth
 
 
+@named("detectEdges")
+@takes(DETECTION)
 def find_edges(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> EdgeResults:
     """What `detectEdges` returns, with all that it computes on the way."""
-    func = "detectEdges"
-    params, selection = detection(func, options)
-    frame = frame_of(func, src, params, mask)
-    if params.noise is None:
-        params = dataclasses.replace(params, noise=noise_of(frame))
-    strength, edges, thin = found_edges(func, frame, params, selection)
-    points = points_of(func, frame, params)
-    return EdgeResults(frame, params.noise, params.heightMap, strength, points, edges, thin, distanceTransform(thin))
+    params, selection = parsed(options, ScanLineParams, Selection)
+    return _edges_of(measured_frame(src, params, mask), params, selection)
 
 
-def detection(func: str, options: Mapping[str, Any]) -> tuple[ScanLineParams, Selection]:
-    """The keywords of `detectEdges` but `mask`, checked as far as that takes no image."""
-    selection, others = _split(options, Selection._fields)
-    params = params_of(func, others.pop("eps", None), others)
-    return params, Selection(**selection).checked(func)
-
-
-def _split(options: Mapping[str, Any], names: Collection[str]) -> tuple[dict[str, Any], dict[str, Any]]:
-    """The options of these names, and the others."""
-    inside = {name: value for name, value in options.items() if name in names}
-    return inside, {name: value for name, value in options.items() if name not in names}
+def _edges_of(frame: Frame, params: ScanLineParams, selection: Selection) -> EdgeResults:
+    strength, points = measure_both(frame, params)
+    edges = select_strength(strength, selection)
+    thin = thinEdges(edges)
+    return EdgeResults(frame, strength, points, edges, thin, distanceTransform(thin))
 
 
 class RegionResults(NamedTuple):
@@ -107,21 +97,21 @@ class RegionResults(NamedTuple):
     surfaces: np.ndarray
 
 
+@named("segmentRegions")
+@takes({**DETECTION, **Growing.options})
 def find_regions(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> RegionResults:
     """What `segmentRegionsWithStats` returns, with all that it computes on the way."""
-    func = "segmentRegions"
-    growing, others = _split(options, Growing._fields)
-    growing = Growing(**growing).checked(func)
-    found = find_edges(src, mask=mask, **others)
-    seeds, labels = seeded_regions(func, found.frame, found.thin, found.noise, growing)
-    _, _, stats, _, surfaces = described_regions(found.frame, labels, found.heightMap)
+    params, selection, growing = parsed(options, ScanLineParams, Selection, Growing)
+    found = _edges_of(measured_frame(src, params, mask), params, selection)
+    seeds, labels = seeded_regions(found.frame, found.thin, growing)
+    _, _, stats, _, surfaces = described_regions(found.frame, labels)
     return RegionResults(found, seeds, labels, stats, surfaces)
 
 
 def edge_files(found: EdgeResults, title: str, options: Mapping[str, Any]) -> dict[str, bytes]:
     """The files of EDGE_FILES."""
     overview = drawOverview(
-        found.surface, found.strength, found.thin, found.distance, title=title, heightMap=found.heightMap
+        found.surface, found.strength, found.thin, found.distance, title=title, heightMap=found.frame.heightMap
     )
     return {
         "overview.png": encoded(".png", overview),
@@ -137,13 +127,14 @@ def edge_files(found: EdgeResults, title: str, options: Mapping[str, Any]) -> di
     }
 
 
+@named("segment")
 def region_files(found: RegionResults, title: str, options: Mapping[str, Any]) -> dict[str, bytes]:
     """The files of REGION_FILES."""
     edges, count, seeds = found.edges, len(found.surfaces) - 1, int(found.seeds.max())
     if count > _LABELS:
-        raise error("segment", f"labels.png has room for {_LABELS} regions, {count} were found; raise `minArea`")
+        raise error(f"labels.png has room for {_LABELS} regions, {count} were found; raise `minArea`")
     if seeds > _LABELS:
-        raise error("segment", f"seeds.png has room for {_LABELS} seeds, {seeds} were found; raise `minDistance`")
+        raise error(f"seeds.png has room for {_LABELS} seeds, {seeds} were found; raise `minDistance`")
     overview = region_overview(
         edges.surface,
         found.seeds,
@@ -151,7 +142,7 @@ def region_files(found: RegionResults, title: str, options: Mapping[str, Any]) -
         edges.strength.kind,
         found.labels,
         title=title,
-        heightMap=edges.heightMap,
+        heightMap=edges.frame.heightMap,
     )
     return {
         "overview.png": encoded(".png", overview),
@@ -164,8 +155,6 @@ def region_files(found: RegionResults, title: str, options: Mapping[str, Any]) -
 
 
 def _report(found: EdgeResults, title: str, options: Mapping[str, Any], **more: int) -> bytes:
-    from . import __version__
-
     report = {
         "image": title,
         "rangeedge": __version__,
@@ -175,7 +164,7 @@ def _report(found: EdgeResults, title: str, options: Mapping[str, Any], **more: 
         "validPixels": int(np.count_nonzero(found.frame.valid)),
         "edgePixels": int(np.count_nonzero(found.thin)),
         **more,
-        "noise": plain(found.noise),
+        "noise": plain(found.frame.noise),
     }
     return json.dumps(report, indent=2, allow_nan=False).encode() + b"\n"
 
@@ -222,6 +211,7 @@ def _surfaces_csv(stats: np.ndarray, surfaces: np.ndarray) -> bytes:
     return ("\n".join(lines) + "\n").encode()
 
 
+@named("write")
 def write_folder(out: str | os.PathLike[str], files: Mapping[str, bytes]) -> None:
     """Write files into a folder, which is made where it is missing.
 
@@ -239,7 +229,7 @@ def write_folder(out: str | os.PathLike[str], files: Mapping[str, bytes]) -> Non
                 (stage / name).write_bytes(data)
             if out.exists():
                 (out / _REPORT).unlink(missing_ok=True)
-                for name in sorted(files, key=_REPORT.__eq__):
+                for name in sorted(files, key=lambda name: name == _REPORT):  # the report comes last
                     os.replace(stage / name, out / name)
             else:
                 out.absolute().parent.mkdir(parents=True, exist_ok=True)
@@ -248,4 +238,4 @@ def write_folder(out: str | os.PathLike[str], files: Mapping[str, bytes]) -> Non
             shutil.rmtree(stage, ignore_errors=True)
     except (OSError, ValueError) as reason:
         what = getattr(reason, "strerror", None) or reason
-        raise error("write", f"cannot write to {os.fspath(out)!r}: {what}", cv2.Error.StsError) from reason
+        raise error(f"cannot write to {os.fspath(out)!r}: {what}", cv2.Error.StsError) from reason

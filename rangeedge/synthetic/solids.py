@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from . import _args
+from .. import _check
 
 Vector = Sequence[float] | np.ndarray
 Rays = tuple[np.ndarray, np.ndarray]  # origins and directions, (N, 3) each
@@ -134,6 +134,7 @@ def cast(scene: Sequence[Solid], rays: Rays) -> tuple[np.ndarray, np.ndarray]:
     return nearest, faces
 
 
+@_check.public
 def plane(point: Vector, normal: Vector) -> Solid:
     """An unbounded plane through a point.
 
@@ -145,10 +146,11 @@ def plane(point: Vector, normal: Vector) -> Solid:
     >>> len(plane((0, 0, 2), (0, 0, -1)).faces)
     1
     """
-    point = vector("plane", "point", point)
-    return Solid((Face(half_space(unit_vector("plane", "normal", normal), point), ()),), point, np.inf)
+    point = vector("point", point)
+    return Solid((Face(half_space(unit_vector("normal", normal), point), ()),), point, np.inf)
 
 
+@_check.public
 def polyhedron(planes: np.ndarray) -> Solid:
     """A bounded convex polyhedron, the intersection of half spaces.
 
@@ -165,13 +167,13 @@ def polyhedron(planes: np.ndarray) -> Solid:
         The half spaces have no bounded intersection.
     """
     expected = "an (N, 4) array of half spaces with a bounded intersection"
-    planes = np.asarray(_args.array("polyhedron", "planes", planes, expected), np.float64)
+    planes = np.asarray(_check.array("planes", planes, expected), np.float64)
     if planes.shape[1] != 4 or not np.isfinite(planes).all() or not planes[:, :3].any(1).all():
-        raise _args.fail("polyhedron", "planes", expected, _args.described(planes))
+        raise _check.fail("planes", expected, _check.described(planes))
     planes = planes / np.linalg.norm(planes[:, :3], axis=1)[:, None]
     corners = _corners(planes)
     if np.linalg.matrix_rank(corners - corners.mean(0) if len(corners) else corners) < 3 or _unbounded(planes):
-        raise _args.fail("polyhedron", "planes", expected, "an empty, flat or unbounded one")
+        raise _check.fail("planes", expected, "an empty, flat or unbounded one")
     sides = [half_space(p[:3], p[:3] * p[3]) for p in planes]
     faces = tuple(Face(side, tuple(other for other in sides if other is not side)) for side in sides)
     center = (corners.min(0) + corners.max(0)) / 2
@@ -201,79 +203,83 @@ def _unbounded(planes: np.ndarray) -> bool:
     return False
 
 
+@_check.public
 def box(center: Vector, size: Vector, rotation: np.ndarray | None = None) -> Solid:
     """A box with sides `size` along the columns of `rotation` (without it, x, y and z).
 
     box(center, size[, rotation]) -> solid
     """
-    center, size = vector("box", "center", center), vector("box", "size", size)
+    center, size = vector("center", center), vector("size", size)
     if (size <= 0).any():
-        raise _args.fail("box", "size", "three numbers > 0", _args.described(size))
-    axes = np.eye(3) if rotation is None else _rotation("box", rotation)
+        raise _check.fail("size", "three numbers > 0", _check.described(size))
+    axes = np.eye(3) if rotation is None else _rotation(rotation)
     normals = np.vstack([axes.T, -axes.T])
     return polyhedron(np.column_stack([normals, normals @ center + np.tile(size, 2) / 2]))
 
 
-def _rotation(func: str, value: Any) -> np.ndarray:
+def _rotation(value: Any) -> np.ndarray:
     expected = "a (3, 3) matrix with orthonormal columns"
-    value = np.asarray(_args.array(func, "rotation", value, expected), np.float64)
+    value = np.asarray(_check.array("rotation", value, expected), np.float64)
     if value.shape != (3, 3) or not np.allclose(value @ value.T, np.eye(3), atol=1e-6):
-        raise _args.fail(func, "rotation", expected, _args.described(value))
+        raise _check.fail("rotation", expected, _check.described(value))
     return value
 
 
+@_check.public
 def sphere(center: Vector, radius: float) -> Solid:
     """A sphere.
 
     sphere(center, radius) -> solid
     """
-    center = vector("sphere", "center", center)
-    radius = _args.number("sphere", "radius", radius, 0, above=True)
+    center = vector("center", center)
+    radius = _check.number("radius", radius, 0, above=True)
     return Solid((Face(_revolution(center, np.zeros(3), 0.0, radius), ()),), center, radius)
 
 
+@_check.public
 def cylinder(center: Vector, axis: Vector, radius: float, height: float) -> Solid:
     """A closed cylinder: its mantle and two caps.
 
     cylinder(center, axis, radius, height) -> solid
     """
-    center, axis = vector("cylinder", "center", center), unit_vector("cylinder", "axis", axis)
-    radius = _args.number("cylinder", "radius", radius, 0, above=True)
-    height = _args.number("cylinder", "height", height, 0, above=True)
+    center, axis = vector("center", center), unit_vector("axis", axis)
+    radius = _check.number("radius", radius, 0, above=True)
+    height = _check.number("height", height, 0, above=True)
     mantle = _revolution(center, axis, 1.0, radius)
     caps = [half_space(way, center + way * height / 2) for way in (axis, -axis)]
     faces = (Face(mantle, tuple(caps)), *(Face(cap, (mantle,)) for cap in caps))
     return Solid(faces, center, float(np.hypot(radius, height / 2)))
 
 
+@_check.public
 def cone(apex: Vector, axis: Vector, radius: float, height: float) -> Solid:
     """A closed cone: its mantle and its base, which lies `height` from the apex along `axis` and has `radius`.
 
     cone(apex, axis, radius, height) -> solid
     """
-    apex, axis = vector("cone", "apex", apex), unit_vector("cone", "axis", axis)
-    radius = _args.number("cone", "radius", radius, 0, above=True)
-    height = _args.number("cone", "height", height, 0, above=True)
+    apex, axis = vector("apex", apex), unit_vector("axis", axis)
+    radius = _check.number("radius", radius, 0, above=True)
+    height = _check.number("height", height, 0, above=True)
     mantle = _revolution(apex, axis, 1 + (radius / height) ** 2, 0.0)
     base, tip = half_space(axis, apex + axis * height), half_space(-axis, apex)
     faces = (Face(mantle, (base, tip)), Face(base, (mantle,)))
     return Solid(faces, apex + axis * height / 2, float(np.hypot(radius, height / 2)))
 
 
-def vector(func: str, name: str, value: Any, length: int = 3) -> np.ndarray:
+def vector(name: str, value: Any, length: int = 3) -> np.ndarray:
     """A checked argument as float64."""
     try:
         result = np.asarray(value, np.float64)
     except (TypeError, ValueError):
         result = np.empty(0)
     if result.shape != (length,) or not np.isfinite(result).all():
-        raise _args.fail(func, name, f"{length} finite numbers", _args.described(value))
+        raise _check.fail(name, f"{length} finite numbers", _check.described(value))
     return result
 
 
-def unit_vector(func: str, name: str, value: Any) -> np.ndarray:
+def unit_vector(name: str, value: Any) -> np.ndarray:
     """A checked argument, scaled to length 1."""
-    result = vector(func, name, value)
+    result = vector(name, value)
     if not result.any():
-        raise _args.fail(func, name, "a vector other than zero", _args.described(value))
+        raise _check.fail(name, "a vector other than zero", _check.described(value))
     return result / np.linalg.norm(result)

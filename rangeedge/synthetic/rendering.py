@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import cv2
 import numpy as np
 
-from . import _args
-from ._constants import (
+from .. import _check
+from ..constants import (
     DIR_COLS,
     DIR_DIAG45,
     DIR_DIAG135,
@@ -23,161 +22,12 @@ from ._constants import (
     EDGE_OCCLUDED,
     EDGE_OCCLUDING,
 )
-from .scanners import (
-    ABW_ASPECT,
-    ABW_CALIBRATIONS,
-    ABW_CENTRE,
-    PERCEPTRON_FIELD,
-    PERCEPTRON_LASER_TO_MIRROR,
-    PERCEPTRON_MIRROR_SLOPE,
-    PERCEPTRON_MIRROR_TO_MIRROR,
-    SCANNER_SIZE,
-)
-from .solids import Face, Rays, Solid, cast, extended, hit, normals_toward_viewer, vector
+from .cameras import Camera
+from .solids import Face, Rays, Solid, cast, extended, hit, normals_toward_viewer
 
 _STEPS = {DIR_ROWS: (1, 0), DIR_COLS: (0, 1), DIR_DIAG45: (1, -1), DIR_DIAG135: (1, 1)}  # (dx, dy) to the next pixel
 _BISECTIONS = 24  # an edge is located within 2**-24 pixels
 TOUCHING = 1e-6  # surfaces closer than this share of their depth meet in a crease
-
-
-@dataclass(frozen=True)
-class Camera:
-    """Where the pixels of a range image look.
-
-    Attributes
-    ----------
-    size
-        (width, height) of the image.
-    rays
-        Function of pixel coordinates x, y (fractions allowed), each of shape (N,), that returns origins and directions
-        of the lines of sight, (N, 3) each. The depth of a point is its multiple of the direction: z for the pinhole and
-        the orthographic camera, the distance along the ray for the angular scanner.
-    geometry
-        The arguments `edgeStrength` needs beside the depths; empty where it needs points.
-    distance
-        Depth at which the ready-made scenes stand.
-    """
-
-    size: tuple[int, int]
-    rays: Callable[[np.ndarray, np.ndarray], Rays]
-    geometry: dict[str, Any]
-    distance: float
-
-    def pixels(self) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates x and y of all pixels, row by row."""
-        width, height = self.size
-        y, x = np.divmod(np.arange(width * height), width)
-        return x.astype(np.float64), y.astype(np.float64)
-
-    def view(self) -> tuple[float, float]:
-        """Width and height of what the camera sees at its working distance."""
-        width, height = self.size
-        origins, directions = self.rays(np.array([0.0, width - 1.0]), np.array([0.0, height - 1.0]))
-        points = origins + ((self.distance - origins[:, 2]) / directions[:, 2])[:, None] * directions
-        return tuple(np.abs(points[1] - points[0])[:2].tolist())
-
-
-def _size(func: str, size: Any) -> tuple[int, int]:
-    if not isinstance(size, Sequence) or len(size) != 2:
-        raise _args.fail(func, "size", "(width, height)", _args.described(size))
-    return _args.integer(func, "size[0]", size[0], 2), _args.integer(func, "size[1]", size[1], 2)
-
-
-def pinholeCamera(K: np.ndarray, size: tuple[int, int], distance: float = 1.0) -> Camera:
-    """A camera whose rays meet in one point.
-
-    pinholeCamera(K, size[, distance]) -> camera
-
-    Parameters
-    ----------
-    K
-        (3, 3) intrinsic matrix.
-    size
-        (width, height) of the image.
-    distance
-        Depth at which the ready-made scenes stand.
-    """
-    size = _size("pinholeCamera", size)
-    distance = _args.number("pinholeCamera", "distance", distance, 0, above=True)
-    K = _args.camera_matrix("pinholeCamera", "K", K).copy()
-    inverse = np.linalg.inv(K)
-
-    def rays(x: np.ndarray, y: np.ndarray) -> Rays:
-        directions = np.stack([x, y, np.ones_like(x)], -1) @ inverse.T
-        return np.zeros_like(directions), directions
-
-    return Camera(size, rays, {"K": K}, distance)
-
-
-def orthographicCamera(pixelSize: tuple[float, float], size: tuple[int, int], distance: float | None = None) -> Camera:
-    """A camera whose rays are parallel to z and form a regular grid around the z axis.
-
-    orthographicCamera(pixelSize, size[, distance]) -> camera
-
-    Parameters
-    ----------
-    pixelSize
-        (dx, dy) in the unit of the scene.
-    size
-        (width, height) of the image.
-    distance
-        Depth at which the ready-made scenes stand; without it, twice the width of the view.
-    """
-    size = _size("orthographicCamera", size)
-    pitch = vector("orthographicCamera", "pixelSize", pixelSize, 2)
-    if (pitch <= 0).any():
-        raise _args.fail("orthographicCamera", "pixelSize", "two numbers > 0", _args.described(pixelSize))
-    distance = 2 * size[0] * pitch[0] if distance is None else distance
-    distance = _args.number("orthographicCamera", "distance", float(distance), 0, above=True)
-
-    def rays(x: np.ndarray, y: np.ndarray) -> Rays:
-        zero = np.zeros_like(x)
-        origins = np.stack([(x - (size[0] - 1) / 2) * pitch[0], (y - (size[1] - 1) / 2) * pitch[1], zero], -1)
-        return origins, np.broadcast_to((0.0, 0.0, 1.0), origins.shape)
-
-    return Camera(size, rays, {"pixelSize": (float(pitch[0]), float(pitch[1]))}, distance)
-
-
-def kinectCamera() -> Camera:
-    """The depth camera of a Kinect v1: 640x480, f = 525 pixels, in metres.
-
-    kinectCamera() -> camera
-    """
-    return pinholeCamera(np.array([[525.0, 0, 319.5], [0, 525.0, 239.5], [0, 0, 1]]), (640, 480), 1.2)
-
-
-def abwCamera() -> Camera:
-    """The ABW structured-light scanner of Hoover et al. (1996), 512x512, second calibration, in millimetres.
-
-    abwCamera() -> camera
-
-    It sees depths from 772 to 1093; its pixels are 0.6 by 0.4 wide there.
-    """
-    focal = ABW_CALIBRATIONS[2].focal
-    K = np.array([[focal, 0, ABW_CENTRE], [0, ABW_ASPECT * focal, ABW_CENTRE], [0, 0, 1]])
-    return pinholeCamera(K, SCANNER_SIZE[::-1], 930.0)
-
-
-def perceptronCamera() -> Camera:
-    """The Perceptron time-of-flight scanner of Hoover et al. (1996), 512x512, in its own unit (about 1 cm).
-
-    perceptronCamera() -> camera
-
-    Two mirrors turn the beam in equal angles, so the points form no regular grid and the rays do not meet in one point.
-    """
-    height, width = SCANNER_SIZE
-    field_x, field_y = PERCEPTRON_FIELD
-
-    def rays(x: np.ndarray, y: np.ndarray) -> Rays:
-        alpha, beta = field_x * ((width - 1) / 2 - x) / width, field_y * ((height - 1) / 2 - y) / height
-        dz = -PERCEPTRON_LASER_TO_MIRROR * (1 - np.cos(alpha)) / np.tan(PERCEPTRON_MIRROR_SLOPE)
-        dy = dz * np.tan(PERCEPTRON_MIRROR_SLOPE + beta / 2)
-        dx = (PERCEPTRON_MIRROR_TO_MIRROR + dy) * np.tan(alpha)
-        # The scanner's x points to the left and its y up.
-        directions = np.stack([-np.sin(alpha), -np.cos(alpha) * np.sin(beta), np.cos(alpha) * np.cos(beta)], -1)
-        return np.stack([-dx, -dy, dz], -1), directions
-
-    return Camera((width, height), rays, {}, 450.0)
 
 
 @dataclass(frozen=True)
@@ -203,7 +53,7 @@ class Rendering:
         faces meet; the `crease`, the angle between both normals in degrees; whether it is `convex`; whether `first` is
         the `nearer`; the `direction`, one of DIR_*.
     jump, crease
-        (H, W) float32: the largest jump, and the largest crease between faces that meet (P§2), at either side.
+        (H, W) float32: the largest jump, and the largest crease between faces that meet (paper, 2), at either side.
     kind
         (H, W) uint8: bits EDGE_*, as `edgeStrength` returns them; convex or concave is that of the largest crease.
     """
@@ -237,6 +87,7 @@ class Rendering:
         kind.ravel()[far] |= EDGE_OCCLUDED
         return kind
 
+    @_check.public
     def edges(self, jumpThreshold: float, creaseThreshold: float) -> np.ndarray:
         """The edges stronger than two thresholds, marked on both sides.
 
@@ -246,8 +97,8 @@ class Rendering:
         degrees; 4 a pixel beside one that sees nothing; 0 none of these. A jump outranks a crease, the sharper crease
         the other one.
         """
-        low = _args.number("edges", "jumpThreshold", jumpThreshold, 0)
-        angle = _args.number("edges", "creaseThreshold", creaseThreshold, 0, 180)
+        low = _check.number("jumpThreshold", jumpThreshold, 0)
+        angle = _check.number("creaseThreshold", creaseThreshold, 0, 180)
         classes = np.zeros(self.depth.size, np.uint8)
         classes[_beside(~np.isfinite(self.depth)).ravel()] = 4
         creases = self.crossings[(self.crossings["jump"] <= low) & (self.crossings["crease"] > angle)]
@@ -271,6 +122,7 @@ def _beside(mask: np.ndarray) -> np.ndarray:
     return (cv2.dilate(mask.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0) & ~mask
 
 
+@_check.public
 def renderScene(scene: Sequence[Solid], camera: Camera) -> Rendering:
     """Cast a ray through every pixel, and find the exact edges between the pixels.
 
@@ -279,7 +131,7 @@ def renderScene(scene: Sequence[Solid], camera: Camera) -> Rendering:
     Between two neighbouring pixels (8-neighbours) on different faces the place where the visible face changes is found
     by bisection on the faces themselves. Both surfaces are intersected with the line of sight there, extended beyond
     the border of the face where need be: the difference of the depths is the jump, the angle between the normals the
-    crease, as the paper defines them (P§2, Fig. 2). Solids are convex, so no face occludes itself.
+    crease, as the paper defines them (paper, 2, Fig. 2). Solids are convex, so no face occludes itself.
 
     Parameters
     ----------
@@ -303,9 +155,9 @@ def renderScene(scene: Sequence[Solid], camera: Camera) -> Rendering:
     0.05
     """
     if not isinstance(scene, Sequence) or not scene or not all(isinstance(solid, Solid) for solid in scene):
-        raise _args.fail("renderScene", "scene", "a non-empty sequence of solids", _args.described(scene))
+        raise _check.fail("scene", "a non-empty sequence of solids", _check.described(scene))
     if not isinstance(camera, Camera):
-        raise _args.fail("renderScene", "camera", "a Camera", _args.described(camera))
+        raise _check.fail("camera", "a Camera", _check.described(camera))
     width, height = camera.size
     rays = origins, directions = camera.rays(*camera.pixels())
     depth, faces = cast(scene, rays)
@@ -384,7 +236,7 @@ def _crossings(every: Sequence[Face], camera: Camera, depth: np.ndarray, faces: 
         is_first = np.isfinite(depth_first) & (depth_first <= hits(1, rays))
         low, high = np.where(is_first, middle, low), np.where(is_first, high, middle)
 
-    # Both surfaces on the line of sight where the view changes from one to the other (P§2: x0, f1 and f2).
+    # Both surfaces on the line of sight where the view changes from one to the other (paper, 2: x0, f1 and f2).
     place = (low + high) / 2
     origins, directions = rays_at(place)
     ahead = [

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 
-from . import _args
+from .. import _check
 
 SCANNER_SIZE = (512, 512)  # rows and columns of an ABW and of a Perceptron image
 
@@ -41,6 +41,7 @@ PERCEPTRON_MIRROR_TO_MIRROR = 5.5  # axis of the nodding mirror to the beam on t
 PERCEPTRON_MIRROR_SLOPE = np.deg2rad(45.0)  # of both mirrors at rest
 
 
+@_check.public
 def abwPoints(code: np.ndarray, calibration: int = 2) -> np.ndarray:
     """Points of an image of the ABW structured light scanner.
 
@@ -71,11 +72,13 @@ def abwPoints(code: np.ndarray, calibration: int = 2) -> np.ndarray:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge.io.calibration import abwPoints
     >>> abwPoints(np.full((512, 512), 255, np.uint8))[255, 255]
     array([   0.    ,    0.    , 1093.1143], dtype=float32)
     """
-    code = _args.image8("abwPoints", "code", code)
-    calibration = _args.integer("abwPoints", "calibration", calibration, 1, 2)
+    code = _check.image8("code", code)
+    calibration = _check.integer("calibration", calibration, 1, 2)
     offset, scale, focal = ABW_CALIBRATIONS[calibration]
 
     row, col = np.indices(code.shape, sparse=True)
@@ -85,6 +88,7 @@ def abwPoints(code: np.ndarray, calibration: int = 2) -> np.ndarray:
     return np.stack([x, y, depth], axis=-1).astype(np.float32)
 
 
+@_check.public
 def perceptronPoints(code: np.ndarray) -> np.ndarray:
     """Points of an image of the Perceptron laser range finder.
 
@@ -112,17 +116,19 @@ def perceptronPoints(code: np.ndarray) -> np.ndarray:
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge.io.calibration import perceptronPoints
     >>> points = perceptronPoints(np.full((512, 512), 1000, np.uint16))
     >>> bool(points[0, 0, 0] < 0 < points[0, 511, 0] and points[0, 0, 1] < 0 < points[511, 0, 1])
     True
     """
     expected = "an integer array of shape (H, W) with values from 0 to 4095"
-    code = _args.array("perceptronPoints", "code", code, expected)
+    code = _check.array("code", code, expected)
     if code.dtype.kind not in "ui":
-        raise _args.fail("perceptronPoints", "code", expected, _args.described(code), cv2.Error.StsUnsupportedFormat)
+        raise _check.fail("code", expected, _check.described(code), cv2.Error.StsUnsupportedFormat)
     low, high = code.min(), code.max()
     if low < 0 or high > 4095:
-        raise _args.fail("perceptronPoints", "code", expected, f"{low} to {high}", cv2.Error.StsOutOfRange)
+        raise _check.fail("code", expected, f"{low} to {high}", cv2.Error.StsOutOfRange)
 
     rows, cols = SCANNER_SIZE
     row, col = np.indices(code.shape, sparse=True)

@@ -1,0 +1,222 @@
+"""Argument checks and output handling, shared by every public function; and the error that they raise.
+
+A check names the argument. `public` names the function: it stands on every function that users call.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Collection
+from typing import Any, ParamSpec, TypeVar
+
+import cv2
+import numpy as np
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+class error(cv2.error, ValueError):
+    """Raised on every bad argument; caught by ``except cv2.error`` and by ``except ValueError``.
+
+    Like OpenCV's own, it carries ``code`` (one of ``cv2.Error``), ``func``, ``err`` and ``msg``.
+    """
+
+    def __init__(self, err: str, code: int = cv2.Error.StsBadArg, func: str = "") -> None:
+        super().__init__()
+        self.code, self.err = code, err
+        self.name(func)
+
+    def name(self, func: str) -> None:
+        """Make `func` the function that the error speaks of."""
+        self.func = func
+        self.msg = f"rangeedge: error: ({self.code}) {f'{func}: ' if func else ''}{self.err}"
+        self.args = (self.msg,)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (self.err, self.code, self.func)
+
+
+def public(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Mark a function that users call: the errors raised in it name it, and not those that it calls."""
+    return named(function.__qualname__)(function)
+
+
+def named(name: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
+    """Let the errors raised in a function name `name`, which is what the user has called."""
+
+    def naming(function: Callable[_P, _R]) -> Callable[_P, _R]:
+        @functools.wraps(function)
+        def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+            try:
+                return function(*args, **kwargs)
+            except error as problem:
+                problem.name(name)
+                raise
+
+        return call
+
+    return naming
+
+
+def fail(name: str, expected: str, got: Any, code: int = cv2.Error.StsBadArg) -> error:
+    """The exception for the argument `name`; the caller raises it."""
+    return error(f"`{name}` must be {expected}, got {got}", code)
+
+
+def described(value: Any) -> str:
+    """An argument in a few words: arrays by dtype and shape, everything else as it prints."""
+    if isinstance(value, np.ndarray):
+        return f"{value.dtype} array of shape {value.shape}"
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def array(name: str, value: Any, expected: str, ndim: Collection[int] = (2,)) -> np.ndarray:
+    """A non-empty array of real numbers with one of the allowed numbers of dimensions."""
+    if not isinstance(value, np.ndarray):
+        raise fail(name, expected, type(value).__name__)
+    if isinstance(value, np.ma.MaskedArray):
+        raise fail(name, f"{expected}, masked pixels filled with NaN or left out by `mask`", "a masked array")
+    if value.ndim not in ndim:
+        raise fail(name, expected, described(value), cv2.Error.StsBadSize)
+    if value.size == 0:
+        raise fail(name, f"{expected}, not empty", described(value), cv2.Error.StsBadSize)
+    if value.dtype.kind not in "buif":
+        raise fail(name, expected, described(value), cv2.Error.StsUnsupportedFormat)
+    # Kernels count pixels in 32 bits, in an image with a margin of one.
+    if value.ndim > 1 and (value.shape[0] + 2) * (value.shape[1] + 2) >= 2**31:
+        expected = f"{expected} of fewer than 2^31 pixels, a margin of one included"
+        raise fail(name, expected, described(value), cv2.Error.StsBadSize)
+    return value
+
+
+def image8(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
+    """An 8-bit (or bool) single-channel image as C-contiguous uint8; values are kept."""
+    expected = "an 8-bit or bool array of shape (H, W)" if shape is None else f"an 8-bit or bool array of shape {shape}"
+    value = array(name, value, expected)
+    if value.dtype not in (np.uint8, np.bool_):
+        raise fail(name, expected, described(value), cv2.Error.StsUnsupportedFormat)
+    if shape is not None and value.shape != shape:
+        raise fail(name, expected, described(value), cv2.Error.StsUnmatchedSizes)
+    return np.ascontiguousarray(value).view(np.uint8)
+
+
+def image32f(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
+    """A real single-channel image as C-contiguous float32; 8-bit and float64 are converted."""
+    expected = "a real array of shape (H, W)" if shape is None else f"a real array of shape {shape}"
+    value = array(name, value, expected)
+    if shape is not None and value.shape != shape:
+        raise fail(name, expected, described(value), cv2.Error.StsUnmatchedSizes)
+    with np.errstate(over="ignore"):
+        return np.ascontiguousarray(value, dtype=np.float32)
+
+
+def labels32s(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
+    """A label image as C-contiguous int32."""
+    expected = "an int32 array of shape (H, W)" if shape is None else f"an int32 array of shape {shape}"
+    value = array(name, value, expected)
+    if value.dtype != np.int32:
+        raise fail(name, expected, described(value), cv2.Error.StsUnsupportedFormat)
+    if shape is not None and value.shape != shape:
+        raise fail(name, expected, described(value), cv2.Error.StsUnmatchedSizes)
+    return np.ascontiguousarray(value)
+
+
+def number(name: str, value: Any, low: float = -np.inf, high: float = np.inf, *, above: bool = False) -> float:
+    """A finite real number in [low, high], or in (low, high] with `above`."""
+    bound = f"{'>' if above else '>='} {low:g}" if np.isfinite(low) else ""
+    if np.isfinite(high):
+        bound = f"{bound} and <= {high:g}".removeprefix(" and ")
+    expected = f"a finite number {bound}".rstrip()
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
+        raise fail(name, expected, described(value))
+    value = float(value)
+    if not np.isfinite(value) or value < low or value > high or (above and value == low):
+        raise fail(name, expected, described(value), cv2.Error.StsOutOfRange)
+    return value
+
+
+def integer(name: str, value: Any, low: int, high: int = 2**31 - 1) -> int:
+    """An integer in [low, high]; bool is none."""
+    expected = f"an integer >= {low}" if high == 2**31 - 1 else f"an integer from {low} to {high}"
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):
+        raise fail(name, expected, described(value))
+    if not low <= value <= high:
+        raise fail(name, expected, described(value), cv2.Error.StsOutOfRange)
+    return int(value)
+
+
+def flag(name: str, value: Any, choices: dict[str, int]) -> int:
+    """One of the named constants."""
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)) or value not in choices.values():
+        raise fail(name, "one of " + ", ".join(f"{k} ({v})" for k, v in choices.items()), described(value))
+    return int(value)
+
+
+def boolean(name: str, value: Any) -> bool:
+    """True or False, nothing that merely counts as one."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise fail(name, "True or False", described(value))
+    return bool(value)
+
+
+def camera_matrix(name: str, value: Any) -> np.ndarray:
+    """The 3x3 matrix of a pinhole camera, as float64."""
+    expected = "a 3x3 camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with finite entries and fx, fy > 0"
+    try:
+        matrix = np.array(value)
+    except ValueError:
+        raise fail(name, expected, described(value)) from None
+    if matrix.dtype.kind not in "iuf":
+        raise fail(name, expected, described(value))
+    matrix = matrix.astype(np.float64)
+    if matrix.shape != (3, 3):
+        raise fail(name, expected, described(value), cv2.Error.StsBadSize)
+    upper = matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[1, 0] == 0 and np.array_equal(matrix[2], (0, 0, 1))
+    if not (upper and np.isfinite(matrix).all()):
+        raise fail(name, expected, matrix.tolist())
+    return matrix
+
+
+def pixel_size(name: str, value: Any) -> tuple[float, float]:
+    """The spacing (dx, dy) of a grid; one number is both."""
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(value, (tuple, list)):
+        value = (value, value)
+    if len(value) != 2:
+        raise fail(name, "a length or a pair (dx, dy)", described(value), cv2.Error.StsBadSize)
+    dx, dy = (number(name, h, 0, above=True) for h in value)
+    return dx, dy
+
+
+def deliver(name: str, result: np.ndarray, dst: np.ndarray | None) -> np.ndarray:
+    """`result`, written into `dst` where that has its shape and dtype, as cv2 does it.
+
+    A `dst` of another shape or dtype is left alone and `result` itself is returned; a read-only one is an error.
+    """
+    if dst is None:
+        return result
+    if not isinstance(dst, np.ndarray):
+        raise fail(name, "an array or None", type(dst).__name__)
+    if dst.shape != result.shape or dst.dtype != result.dtype:
+        return result
+    if not dst.flags.writeable:
+        raise fail(name, "writable", "a read-only array")
+    dst[...] = result
+    return dst
+
+
+def strength32f(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
+    """An image of finite strengths >= 0 as C-contiguous float32."""
+    value = image32f(name, value, shape)
+    if not (value.min() >= 0 and value.max() < np.inf):  # NaN fails either comparison
+        raise fail(name, "finite and >= 0 everywhere", f"values from {value.min():g} to {value.max():g}")
+    return value
+
+
+def threshold(name: str, value: Any) -> float:
+    """A number >= 0; infinity, which no strength reaches, switches the test off."""
+    if isinstance(value, (float, np.floating)) and value == np.inf:
+        return np.inf
+    return number(name, value, 0)

@@ -1,0 +1,224 @@
+"""Range images in TIFF files: one channel, or the three of points, integers or floats, in strips or tiles.
+
+Read here: uncompressed, PackBits, LZW, deflate and LZMA, each with any predictor. What is compressed otherwise (ZSTD,
+LERC, ...) is left to tifffile and imagecodecs, where they are installed.
+"""
+
+from __future__ import annotations
+
+import io
+import lzma
+import struct
+import zlib
+
+import numpy as np
+
+from .. import _core
+from . import tiff_tags as tag
+from .geotiff import described_by
+from .range_image import RangeImage
+from .source import expect_at_least, expect_pixels, expect_unpacked
+from .tiff_tags import Page
+
+_UNCOMPRESSED, _LZW, _DEFLATE, _OLD_DEFLATE, _PACK_BITS, _LZMA = 1, 5, 8, 32946, 32773, 34925
+_COMPRESSIONS = {7: "JPEG", 34887: "LERC", 50000: "ZSTD", 50001: "WebP", 50002: "JPEG XL"}
+_PHOTOMETRICS = {2: "RGB", 3: "a palette", 5: "CMYK", 6: "YCbCr", 8: "CIELab"}
+_KINDS = {1: "u", 2: "i", 3: "f", 4: "u"}  # by sample format
+
+
+def read_tiff(data: bytes) -> RangeImage:
+    """The first page, which must be the only one but for overviews and masks."""
+    reduced, mask = 1, 4
+    found = [page for page in tag.pages(data) if not page.value(tag.NEW_SUBFILE_TYPE, 0) & (reduced | mask)]
+    if len(found) != 1:
+        raise ValueError(
+            f"it holds {len(found)} images; store the one that is meant in a file of its own (x, y and z as the three "
+            "channels of one image)"
+        )
+    return described_by(found[0], _pixels(found[0], data))
+
+
+def _pixels(page: Page, data: bytes) -> np.ndarray:
+    rows, cols = page.value(tag.LENGTH), page.value(tag.WIDTH)
+    expect_pixels(rows, cols)
+    dtype, samples = _sample_type(page)
+    compression = page.value(tag.COMPRESSION, _UNCOMPRESSED)
+    size = rows * cols * samples * dtype.itemsize
+    if compression == _UNCOMPRESSED:
+        expect_at_least(len(data), size)
+    else:
+        expect_unpacked(size, len(data))
+    if compression not in _DECODERS:
+        image = _by_tifffile(data, _COMPRESSIONS.get(compression, f"method {compression}"))
+    else:
+        image = _from_segments(page, rows, cols, samples, dtype)
+    if image.shape[:2] != (rows, cols) and samples > 1:
+        image = np.moveaxis(image, 0, -1)
+    return image[..., 0] if image.ndim == 3 and samples == 1 else image
+
+
+def _sample_type(page: Page) -> tuple[np.dtype, int]:
+    """The type of a sample, and how many there are a pixel."""
+    photometric, samples = page.value(tag.PHOTOMETRIC, 1), page.value(tag.SAMPLES_PER_PIXEL, 1)
+    bits = set(page.values(tag.BITS_PER_SAMPLE, (1,)).tolist())
+    kinds = set(page.values(tag.SAMPLE_FORMAT, (1,)).tolist())
+    if photometric in _PHOTOMETRICS:
+        raise ValueError(
+            f"it holds colours ({_PHOTOMETRICS[photometric]}), no range image; store points with photometric "
+            "'minisblack', as tifffile and imwriteRange do, or pass them as an array"
+        )
+    if len(bits) != 1 or len(kinds) != 1 or not kinds <= _KINDS.keys():
+        raise ValueError(f"it holds samples of {sorted(bits)} bits of the formats {sorted(kinds)}")
+    (width,), (kind,) = bits, kinds
+    if width <= 8:
+        raise ValueError(f"it holds {width} bits (8 bits are too coarse for edges); a range image has 16 or more")
+    if width not in (16, 32, 64):
+        raise ValueError(f"it holds samples of {width} bits, not of 16, 32 or 64")
+    if samples not in (1, 3, 4):
+        raise ValueError(f"it holds {samples} channels; a range image has one, or the three of x, y and z")
+    return np.dtype(f"{page.order}{_KINDS[kind]}{width // 8}"), samples
+
+
+def _from_segments(page: Page, rows: int, cols: int, samples: int, dtype: np.dtype) -> np.ndarray:
+    """An image of shape (rows, cols, samples) from its strips or tiles."""
+    if page.value(tag.FILL_ORDER, 1) != 1:
+        raise ValueError("the bits of its bytes are in reverse order")
+    separate = page.value(tag.PLANAR_CONFIGURATION, 1) == 2 and samples > 1
+    planes, depth = (samples, 1) if separate else (1, samples)
+    tiled = tag.TILE_OFFSETS in page
+    if tiled:
+        height, width = page.value(tag.TILE_LENGTH), page.value(tag.TILE_WIDTH)
+        offsets, counts = page.values(tag.TILE_OFFSETS), page.values(tag.TILE_BYTE_COUNTS)
+    else:
+        height, width = min(page.value(tag.ROWS_PER_STRIP, rows), rows), cols
+        offsets, counts = page.values(tag.STRIP_OFFSETS), page.values(tag.STRIP_BYTE_COUNTS)
+    if height < 1 or width < 1 or height * width > 4 * rows * cols + 2**20:
+        raise ValueError(f"its strips or tiles have {width} x {height} pixels")
+    down, right = -(-rows // height), -(-cols // width)
+    if len(offsets) != planes * down * right or len(counts) != len(offsets):
+        raise ValueError(f"it has {len(offsets)} strips or tiles where {planes * down * right} are needed")
+
+    decode = _DECODERS[page.value(tag.COMPRESSION, _UNCOMPRESSED)]
+    predictor = page.value(tag.PREDICTOR, 1) if decode is not _stored else 1
+    image = np.empty((rows, cols, samples), dtype.newbyteorder("="))
+    for index, (offset, count) in enumerate(zip(offsets.tolist(), counts.tolist(), strict=True)):
+        plane, place = divmod(index, down * right)
+        top, left = place // right * height, place % right * width
+        segment_rows = height if tiled else min(height, rows - top)
+        expect_at_least(len(page.data), offset + count)
+        packed = np.frombuffer(page.data, np.uint8, count, offset)
+        size = segment_rows * width * depth * dtype.itemsize
+        plain = decode(packed, size)
+        if len(plain) < size:
+            raise ValueError(f"a strip or tile unpacks to {len(plain)} bytes where {size} are needed")
+        segment = _unpredicted(plain, (segment_rows, width, depth), dtype, predictor)
+        target = image[top : top + segment_rows, left : left + width, plane : plane + depth]
+        target[...] = segment[: target.shape[0], : target.shape[1]]
+    return image
+
+
+def _unpredicted(plain: bytes, shape: tuple[int, int, int], dtype: np.dtype, predictor: int) -> np.ndarray:
+    """Samples from what the predictor left of them: differences along the row, or of the bytes of floats."""
+    rows, cols, depth = shape
+    if predictor == 1:
+        return np.frombuffer(plain, dtype, rows * cols * depth).reshape(shape)
+    if predictor == 2:
+        whole = dtype.newbyteorder("=").str.replace("f", "u").replace("i", "u")
+        steps = np.frombuffer(plain, dtype.str[0] + whole[1:], rows * cols * depth).reshape(shape).astype(whole)
+        return np.add.accumulate(steps, axis=1, dtype=whole).view(dtype.newbyteorder("="))
+    if predictor == 3 and dtype.kind == "f":
+        # The most significant bytes of a row come first, then the next ones; of all that the differences.
+        size = dtype.itemsize
+        steps = np.frombuffer(plain, np.uint8, rows * cols * depth * size).reshape(rows, -1, depth)
+        planes = np.add.accumulate(steps, axis=1, dtype=np.uint8).reshape(rows, size, cols * depth)
+        return np.ascontiguousarray(planes.transpose(0, 2, 1)).view(f">f{size}").reshape(shape)
+    raise ValueError(f"it has the predictor {predictor} on {dtype}")
+
+
+def _stored(packed: np.ndarray, size: int) -> bytes:
+    return packed[:size].data
+
+
+def _lzw(packed: np.ndarray, size: int) -> bytes:
+    plain = np.empty(size, np.uint8)
+    return plain[: _core.lzw_unpack(packed, plain)].data
+
+
+def _deflate(packed: np.ndarray, size: int) -> bytes:
+    return zlib.decompressobj().decompress(packed.data, size)
+
+
+def _lzma(packed: np.ndarray, size: int) -> bytes:
+    return lzma.LZMADecompressor(memlimit=2**28).decompress(packed.tobytes(), size)
+
+
+def _pack_bits(packed: np.ndarray, size: int) -> bytes:
+    """Runs: a byte n below 128 announces n + 1 bytes, one above says that the next is repeated 257 - n times."""
+    data, plain, at = packed.tobytes(), bytearray(), 0
+    while at < len(data) and len(plain) < size:
+        head = data[at]
+        if head < 128:
+            plain += data[at + 1 : at + 2 + head]
+            at += 2 + head
+        elif head > 128:
+            plain += data[at + 1 : at + 2] * (257 - head)
+            at += 2
+        else:
+            at += 1
+    return bytes(plain)
+
+
+_DECODERS = {
+    _UNCOMPRESSED: _stored,
+    _LZW: _lzw,
+    _DEFLATE: _deflate,
+    _OLD_DEFLATE: _deflate,
+    _PACK_BITS: _pack_bits,
+    _LZMA: _lzma,
+}
+
+
+def _by_tifffile(data: bytes, compression: str) -> np.ndarray:
+    try:
+        import imagecodecs  # noqa: F401
+        import tifffile
+    except ImportError:
+        raise ValueError(
+            f"it is compressed by {compression}, for which imagecodecs is needed: pip install 'rangeedge[tiff]', or "
+            "store it uncompressed or by deflate"
+        ) from None
+    with tifffile.TiffFile(io.BytesIO(data)) as file:
+        return file.pages.first.asarray(maxworkers=1)
+
+
+def write_tiff(src: np.ndarray) -> bytes:
+    """An uncompressed TIFF of one channel, or of the three or four of points."""
+    samples = 1 if src.ndim == 2 else src.shape[2]
+    if src.dtype.kind not in "iuf" or src.dtype.itemsize not in (2, 4, 8) or src.nbytes >= 2**32 - 1024:
+        raise ValueError("integers or floats of 16, 32 or 64 bits, of less than 4 GiB")
+    pixels = src.astype(src.dtype.newbyteorder("<"), copy=False).tobytes()
+    short, long = 3, 4
+    tags = [
+        (tag.WIDTH, long, [src.shape[1]]),
+        (tag.LENGTH, long, [src.shape[0]]),
+        (tag.BITS_PER_SAMPLE, short, [8 * src.dtype.itemsize] * samples),
+        (tag.COMPRESSION, short, [_UNCOMPRESSED]),
+        (tag.PHOTOMETRIC, short, [1]),
+        (tag.STRIP_OFFSETS, long, [8]),
+        (tag.SAMPLES_PER_PIXEL, short, [samples]),
+        (tag.ROWS_PER_STRIP, long, [src.shape[0]]),
+        (tag.STRIP_BYTE_COUNTS, long, [len(pixels)]),
+        (tag.PLANAR_CONFIGURATION, short, [1]),
+        (tag.EXTRA_SAMPLES, short, [0] * (samples - 1)),
+        (tag.SAMPLE_FORMAT, short, [{"u": 1, "i": 2, "f": 3}[src.dtype.kind]] * samples),
+    ]
+    tags = [(code, kind, values) for code, kind, values in tags if values]
+    start = 8 + len(pixels) + len(pixels) % 2
+    behind = start + 2 + 12 * len(tags) + 4
+    entries, more = struct.pack("<H", len(tags)), b""
+    for code, kind, values in tags:
+        packed = struct.pack(f"<{len(values)}{'H' if kind == short else 'I'}", *values)
+        if len(packed) > 4:
+            packed, more = struct.pack("<I", behind + len(more)), more + packed
+        entries += struct.pack("<HHI", code, kind, len(values)) + packed.ljust(4, b"\0")
+    return struct.pack("<2sHI", b"II", 42, start) + pixels + bytes(len(pixels) % 2) + entries + bytes(4) + more
