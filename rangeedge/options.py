@@ -319,7 +319,7 @@ class ScanLineParams(Options):
         metavar="N",
     )
     mergeSignificance: float = option(
-        5.0,
+        3.0,
         _real(0),
         "float",
         "Cuts are taken back where that raises the sum of squared residuals by less than its square, in variances of"
@@ -328,7 +328,7 @@ class ScanLineParams(Options):
         group="scan lines",
     )
     minSignificance: float = option(
-        12.0,
+        6.0,
         _real(0),
         "float",
         "Candidates are dropped whose significance, joined with that of their neighbours, is below this; 0 keeps all.",
@@ -378,6 +378,13 @@ class Selection(Options):
         unit="pixels",
         read=int,
         metavar="N",
+    )
+    lineSignificance: float = option(
+        12.0,
+        _real(0),
+        "float",
+        "Significance that a connected line must reach somewhere, as `minSignificance` is what each of its pixels must"
+        " have; 0 keeps all lines.",
     )
     dynamic: bool = option(
         False,

@@ -46,7 +46,10 @@ NoiseEstimate estimate_noise(const T* ordinate, int rows, int cols, bool project
     const double rounding = step / std::sqrt(12.0);
     NoiseEstimate estimate;
     estimate.single = projective ? of_depths(found, rounding) : of_heights(found, rounding);
-    estimate.fits = fit_noise(ordinate, rows, cols, projective, estimate.single, threads);
+    // Of the noise of neighbours nothing is to be seen.
+    const double middle = (found.lowest + found.highest) / 2, extent = found.highest - found.lowest;
+    const bool silent = found.quiet <= finest * (projective ? std::abs(middle) : extent);
+    estimate.fits = fit_noise(ordinate, rows, cols, projective, estimate.single, silent, threads);
     return estimate;
 }
 

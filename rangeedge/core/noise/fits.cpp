@@ -24,9 +24,12 @@ constexpr int longest = 64;         // samples of a window whose residuals are l
 constexpr std::size_t least_windows = 40;  // that tell a deviation
 constexpr std::size_t depth_bins = 6;
 constexpr double most_growth = 1.41;       // of a factor from n to 2 n, beyond what is measured
+constexpr double smooth_growth = 5.66;     // the same of waves without an end, 2^2.5: more than that is no noise
+constexpr double value_per_slope = 0.5;    // of factors, at the least: a wrong slope makes the value at the end wrong
 constexpr double least_factor = 0.5;       // errors that cancel each other are not relied on
+constexpr double median_magnitude = 0.67449;  // of a normal variable, where a median of deviations is looked for
 constexpr double residual_factor = 1.25;   // for what the curves of splitting, through three samples, are off themselves
-constexpr double most_residual = 12;
+constexpr double most_residual = 12;       // times the factor on slopes of the shortest fits
 
 double m2(double n) { return n * (n * n - 1) / 12; }
 
@@ -74,10 +77,8 @@ public:
         const double beta = (n * n - 1) / 12.0, norm2 = m2(n) * (n * n - 4.0) / 15, y2 = w.htt - beta * w.h;
         return std::max(0.0, w.hh - w.h * w.h / n - w.ht * w.ht / m2(n) - y2 * y2 / norm2);
     }
-    // Whether all of them have data, and not all the same value.
-    bool tells(int k, int n) const {
-        return sums_[k + n].invalid == sums_[k].invalid && sums_[k + n].changes > sums_[k + 1].changes;
-    }
+    bool valid(int k, int n) const { return sums_[k + n].invalid == sums_[k].invalid; }
+    bool constant(int k, int n) const { return sums_[k + n].changes == sums_[k + 1].changes; }
 
 private:
     struct Sums {
@@ -98,7 +99,7 @@ private:
     double middle_ = 0, base_ = 0;
 };
 
-// D and G of two adjacent windows, over what white noise of unit deviation gives them, and the ordinate there.
+// D and G of three adjacent windows, over what white noise of unit deviation gives them, and the ordinate there.
 struct Step {
     double slope, gap, ordinate;
 };
@@ -114,10 +115,11 @@ struct DirectionSteps {
     std::vector<Step> residuals;  // of long windows: the deviation as `gap`
 };
 
-Step step_between(const LineSums& line, int k, int n) {
-    const LineSums::Fit f = line.fit(k, n), g = line.fit(k + n, n);
-    const double slope = g.slope - f.slope, gap = g.mean - f.mean - (f.slope + g.slope) * n / 2;
-    return {slope / std::sqrt(2 / m2(n)), gap / std::sqrt(2 * (1.0 / n + n * n / (4 * m2(n)))), (f.mean + g.mean) / 2};
+Step step_of(const LineSums& line, int k, int n) {
+    const LineSums::Fit f1 = line.fit(k, n), f2 = line.fit(k + n, n), f3 = line.fit(k + 2 * n, n);
+    const double slope = f1.slope - 2 * f2.slope + f3.slope;
+    const double gap = f1.mean - 2 * f2.mean + f3.mean - (f3.slope - f1.slope) * n / 2;
+    return {slope / std::sqrt(6 / m2(n)), gap / std::sqrt(6.0 / n + n * n / (2 * m2(n))), f2.mean};
 }
 
 // Calls visit(k) for places of windows of n samples in a line, the same ones whichever end it begins at.
@@ -135,10 +137,13 @@ void for_each_window(int size, int n, Visit&& visit) {
 // `lines` scan lines of `size` samples; `line_step` and `sample_step` lead from one to the next.
 template <class T>
 DirectionSteps steps_along(const T* ordinate, int lines, int size, std::ptrdiff_t line_step,
-                           std::ptrdiff_t sample_step) {
+                           std::ptrdiff_t sample_step, bool silent) {
     DirectionSteps found;
     const int groups = std::min(most_groups, lines / neighbours);
     LineSums sums[neighbours];
+    const auto tells = [silent](const LineSums& line, int k, int n) {
+        return line.valid(k, n) && (silent || !line.constant(k, n));
+    };
     for (int group = 0; group < groups; ++group) {
         // Evenly spaced, and the same ones from either side.
         const int mirrored = groups - 1 - group, room = lines - neighbours;
@@ -149,12 +154,12 @@ DirectionSteps steps_along(const T* ordinate, int lines, int size, std::ptrdiff_
         for (int level = 0; level < measured_levels; ++level) {
             const int n = 4 << level;
             Steps& steps = found.levels[level];
-            for_each_window(size, 2 * n, [&](int k) {
+            for_each_window(size, 3 * n, [&](int k) {
                 Step mean{};
                 int told = 0;
                 for (const LineSums& line : sums) {
-                    if (!line.tells(k, 2 * n)) continue;
-                    const Step s = step_between(line, k, n);
+                    if (!tells(line, k, 3 * n)) continue;
+                    const Step s = step_of(line, k, n);
                     steps.single.push_back(s);
                     mean.slope += s.slope, mean.gap += s.gap, mean.ordinate += s.ordinate;
                     ++told;
@@ -168,7 +173,7 @@ DirectionSteps steps_along(const T* ordinate, int lines, int size, std::ptrdiff_
         if (n <= 8) continue;
         for (const LineSums& line : sums)
             for_each_window(size, n, [&](int k) {
-                if (!line.tells(k, n)) return;
+                if (!tells(line, k, n)) return;
                 const double ordinate_there = line.fit(k, n).mean;
                 found.residuals.push_back({0, std::sqrt(line.residual_squares(k, n) / (n - 3)), ordinate_there});
             });
@@ -234,15 +239,13 @@ private:
 };
 
 // Factors at all levels from those that are measured, the rest by how the last ones grow.
-void write_factors(const double* measured, const double* at_least, double* factors) {
+void write_factors(const double* measured, double* factors) {
     double last = 1, before = 1;
     for (int level = 0; level < FitFactors::levels; ++level) {
         double factor = level < measured_levels ? measured[level] : std::nan("");
         if (!(factor == factor)) factor = last * std::max(1.0, std::min(most_growth, last / before));
-        factor = std::max(factor, level == 0 ? 1.0 : least_factor);
-        if (at_least) factor = std::max(factor, at_least[level]);
-        factors[level] = factor;
-        before = last, last = factor;
+        before = last, last = level == 0 ? factor : std::min(factor, smooth_growth * last);
+        factors[level] = std::max(last, level == 0 ? 1.0 : least_factor);
     }
 }
 
@@ -256,24 +259,30 @@ void write_fit_noise(const DirectionSteps& found, Measure& measure, double* numb
         measured[2][level] = measure.factor(steps.shared, &Step::slope, n);
         measured[3][level] = measure.factor(steps.shared, &Step::gap, n);
     }
-    for (int kind = 0; kind < 4; ++kind) {
-        double* own = numbers + kind * FitFactors::levels;
-        write_factors(measured[kind], kind < 2 ? nullptr : own - 2 * FitFactors::levels, own);
+    for (int kind = 0; kind < 4; ++kind)
+        write_factors(measured[kind], numbers + kind * FitFactors::levels);
+    for (int level = 0; level < FitFactors::levels; ++level) {
+        double *slope = numbers + level, *value = slope + FitFactors::levels;
+        double *shared_slope = value + FitFactors::levels, *shared_value = shared_slope + FitFactors::levels;
+        *value = std::max(*value, value_per_slope * *slope);
+        *shared_slope = std::max(*shared_slope, *slope);
+        *shared_value = std::max({*shared_value, *value, value_per_slope * *shared_slope});
     }
-    const double residual = residual_factor * measure.factor(found.residuals, &Step::gap, longest);
-    numbers[4 * FitFactors::levels] = residual >= 1 ? std::min(residual, most_residual) : 1;
+    const double residual = residual_factor * median_magnitude * measure.factor(found.residuals, &Step::gap, longest);
+    numbers[4 * FitFactors::levels] = residual >= 1 ? std::min(residual, most_residual * numbers[0]) : 1;
 }
 
 }  // namespace
 
 template <class T>
 FitNoiseEstimate fit_noise(const T* ordinate, int rows, int cols, bool projective, const Deviation& single,
-                           int threads) {
+                           bool silent, int threads) {
     DirectionSteps found[2];
     Team team(std::min(threads, 2));
     parallel_for(2, team, [&](int begin, int end, int) {
         for (int i = begin; i < end; ++i)
-            found[i] = i == 0 ? steps_along(ordinate, rows, cols, cols, 1) : steps_along(ordinate, cols, rows, 1, cols);
+            found[i] = i == 0 ? steps_along(ordinate, rows, cols, cols, 1, silent)
+                              : steps_along(ordinate, cols, rows, 1, cols, silent);
     });
     FitNoiseEstimate estimate{};
     estimate.waves = waves_of(found, projective, single);
@@ -284,7 +293,7 @@ FitNoiseEstimate fit_noise(const T* ordinate, int rows, int cols, bool projectiv
     return estimate;
 }
 
-template FitNoiseEstimate fit_noise(const float*, int, int, bool, const Deviation&, int);
-template FitNoiseEstimate fit_noise(const double*, int, int, bool, const Deviation&, int);
+template FitNoiseEstimate fit_noise(const float*, int, int, bool, const Deviation&, bool, int);
+template FitNoiseEstimate fit_noise(const double*, int, int, bool, const Deviation&, bool, int);
 
 }  // namespace rangeedge

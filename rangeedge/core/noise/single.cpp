@@ -21,7 +21,7 @@ constexpr std::size_t most_bins = 8;
 constexpr std::size_t least_bin = 50;      // windows
 constexpr double quantised_share = 0.3;    // of windows with equal neighbours: more have values with a step
 constexpr std::size_t ranked_windows = 4096;  // that tell the borders of bins
-const double rounding = std::sqrt(12.0);   // a step over the deviation of rounding to it
+const double per_difference = std::sqrt(20.0);  // deviation of a third difference of independent values
 
 // Of windows of four samples: the magnitude of the third difference, the mean ordinate, and the least difference of
 // neighbours other than zero, 0 where no two of them are equal. The mean is independent of the difference, so that bins
@@ -33,7 +33,7 @@ struct Windows {
     void reserve(std::ptrdiff_t windows) {
         for (auto* values : {&differences, &ordinates, &steps}) values->resize(count + static_cast<std::size_t>(windows) + padding);
     }
-    // The window that begins at y, of samples `apart`.
+    // The window that begins at y, of samples `apart`; two more on either side are of the same line.
     template <class T>
     RANGEEDGE_INLINE void add(const T* y, std::ptrdiff_t apart) {
         constexpr float most = std::numeric_limits<float>::max();
@@ -46,45 +46,52 @@ struct Windows {
         differences[count] = difference;
         ordinates[count] = mean;
         steps[count] = static_cast<float>((a == 0) | (b == 0) | (c == 0) ? least(least(a, b), c) : 0);
-        const bool constant = (a == 0) & (b == 0) & (c == 0);
+        const bool constant = (a == 0) & (b == 0) & (c == 0) & (y[-2 * apart] == y[-apart]) & (y[-apart] == y[0]) &
+                              (y[3 * apart] == y[4 * apart]) & (y[4 * apart] == y[5 * apart]);
         count += (difference <= most) & (std::abs(mean) <= most) & !constant;  // not so with NaN
     }
-    // Every so many windows of a line of `number`, the same ones whichever end it begins at.
+    // Every so many of `number` windows that begin side by side, the same ones whichever end is the first.
     template <class T>
-    void add_line(const T* y, std::ptrdiff_t number, std::ptrdiff_t step, std::ptrdiff_t every, std::ptrdiff_t apart) {
-        const std::ptrdiff_t taken = (number + every - 1) / every, first = (number - 1 - (taken - 1) * every) / 2;
-        for (std::ptrdiff_t i = 0; i < taken; ++i) add(y + (first + i * every) * step, apart);
+    void add_line(const T* y, std::ptrdiff_t number, std::ptrdiff_t every, std::ptrdiff_t apart) {
+        for (std::ptrdiff_t i = 0; 2 * i < number; i += every) {
+            add(y + i, apart);
+            if (2 * i < number - 1) add(y + number - 1 - i, apart);
+        }
     }
 };
 
 template <class T>
 Windows windows_of(const T* ordinate, std::ptrdiff_t rows, std::ptrdiff_t cols, std::ptrdiff_t apart) {
     const std::ptrdiff_t every = 1 + rows * cols / most_windows;
-    const std::ptrdiff_t down = std::max<std::ptrdiff_t>(0, rows - 3 * apart);
-    const std::ptrdiff_t along = std::max<std::ptrdiff_t>(0, cols - 3 * apart);
+    const std::ptrdiff_t margin = 2 * apart;  // samples on either side of a window
+    const std::ptrdiff_t down = std::max<std::ptrdiff_t>(0, rows - 3 * apart - 2 * margin);
+    const std::ptrdiff_t along = std::max<std::ptrdiff_t>(0, cols - 3 * apart - 2 * margin);
     Windows windows;
-    windows.reserve(down * (cols / every + 1) + along * (rows / every + 1));
-    if (down > 0)
-        for (std::ptrdiff_t v = 0; v < down; ++v) windows.add_line(ordinate + v * cols, cols, 1, every, apart * cols);
-    const std::ptrdiff_t lines = (rows + every - 1) / every, first = (rows - 1 - (lines - 1) * every) / 2;
-    for (std::ptrdiff_t i = 0; i < lines; ++i) {
-        const T* line = ordinate + (first + i * every) * cols;
-        for (std::ptrdiff_t u = 0; u < along; ++u) windows.add(line + u, apart);
+    windows.reserve(down * (cols / every + 2) + along * (rows / every + 2));
+    for (std::ptrdiff_t v = 0; v < down; ++v)
+        windows.add_line(ordinate + (v + margin) * cols, cols, every, apart * cols);
+    for (std::ptrdiff_t i = 0; i < rows; ++i) {
+        if (std::min(i, rows - 1 - i) % every != 0) continue;
+        const T* line = ordinate + i * cols;
+        for (std::ptrdiff_t u = 0; u < along; ++u) windows.add(line + u + margin, apart);
     }
     return windows;
 }
 
-// The deviation that third differences tell, not below that of rounding to the step of quantised values.
-double deviation_of(const float* differences, const float* steps, std::size_t count) {
-    const double sigma = trimmed_deviation(differences, count) / std::sqrt(20.0);
+// The deviation of rounding to the step that quantised values show; 0 of others.
+double rounding_deviation(const float* steps, std::size_t count) {
     std::vector<float> equal;
     for (std::size_t k = 0; k < count; ++k)
         if (steps[k] > 0) equal.push_back(steps[k]);
-    if (static_cast<double>(equal.size()) < quantised_share * static_cast<double>(count)) return sigma;
-    if (equal.empty()) return sigma;
+    if (equal.empty() || static_cast<double>(equal.size()) < quantised_share * static_cast<double>(count)) return 0;
     const auto middle = equal.begin() + static_cast<std::ptrdiff_t>(equal.size() / 2);
     std::nth_element(equal.begin(), middle, equal.end());
-    return std::max(sigma, static_cast<double>(*middle) / rounding);
+    return static_cast<double>(*middle) / std::sqrt(12.0);
+}
+
+// The deviation that third differences show, not below that of rounding.
+double deviation_of(const float* differences, const float* steps, std::size_t count) {
+    return std::max(trimmed_deviation(differences, count) / per_difference, rounding_deviation(steps, count));
 }
 
 // The windows of one range of ordinates.
@@ -136,6 +143,10 @@ SingleNoise single_noise(const T* ordinate, int rows, int cols, int threads) {
         for (std::size_t i; (i = taken++) <= bins.size();) {
             if (i == 0) {
                 result.deviation = deviation_of(windows.differences.data(), windows.steps.data(), windows.count);
+                std::vector<float> sizes(windows.differences);
+                sizes.resize(windows.count);
+                result.quiet = std::max(quartile_deviation(sizes) / per_difference,
+                                        rounding_deviation(windows.steps.data(), windows.count));
                 continue;
             }
             Bin& bin = bins[i - 1];

@@ -14,7 +14,9 @@ namespace {
 
 constexpr double kept_share = 0.75;
 constexpr double kept_deviation = 0.607;      // of a normal variable of deviation 1, within its central 75 %
-constexpr double median_magnitude = 0.67449;  // of that variable
+constexpr double median_magnitude = 0.67449;   // of that variable
+constexpr double quarter_magnitude = 0.31864;  // the lower quartile of its magnitudes
+constexpr double quarter_excess = 1.5;         // by which the median may exceed what the quartile tells
 constexpr int dropped_bits = 20;              // of a float that its bucket does not tell: 8 buckets an octave are left
 
 // The sum of the squares of values whose bits, as an integer, are below a limit.
@@ -86,11 +88,19 @@ double trimmed_deviation(const float* magnitudes, std::size_t count) {
     return std::sqrt(Histogram(magnitudes, count).squares(kept) / static_cast<double>(kept)) / kept_deviation;
 }
 
+double quartile_deviation(std::vector<float>& magnitudes) {
+    if (magnitudes.empty()) return 0;
+    const auto quarter = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / 4);
+    std::nth_element(magnitudes.begin(), quarter, magnitudes.end());
+    return static_cast<double>(*quarter) / quarter_magnitude;
+}
+
 double median_deviation(std::vector<float>& magnitudes) {
     if (magnitudes.empty()) return 0;
     const auto middle = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / 2);
     std::nth_element(magnitudes.begin(), middle, magnitudes.end());
-    return static_cast<double>(*middle) / median_magnitude;
+    const double by_median = static_cast<double>(*middle) / median_magnitude;
+    return std::min(by_median, quarter_excess * quartile_deviation(magnitudes));
 }
 
 }  // namespace rangeedge

@@ -88,8 +88,9 @@ Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOpti
     return columns(candidates);
 }
 
-void keep_long_components(const Image<std::uint8_t>& edges, int min_length, const OutImage<std::uint8_t>& kept) {
-    long_components(edges.data(), rows(edges), cols(edges), min_length, kept.data());
+void bound_keep_lines(const Image<std::uint8_t>& edges, int min_length, const Image<float>& significance, float min_peak,
+                      const OutImage<std::uint8_t>& kept) {
+    keep_lines(edges.data(), rows(edges), cols(edges), min_length, significance.data(), min_peak, kept.data());
 }
 
 }  // namespace
@@ -108,7 +109,8 @@ void bind_edges(nb::module_& m) {
           array("kind"), array("significance"), Unlocked());
     m.def("edge_strength_and_candidates", &edge_strength_and_candidates, "frame"_a, "options"_a, "threads"_a,
           array("jump"), array("crease"), array("kind"), array("significance"));
-    m.def("long_components", &keep_long_components, array("edges"), "min_length"_a, array("kept"), Unlocked());
+    m.def("keep_lines", &bound_keep_lines, array("edges"), "min_length"_a, optional_array("significance"), "min_peak"_a,
+          array("kept"), Unlocked());
 }
 
 }  // namespace rangeedge::python
