@@ -8,8 +8,9 @@ import numpy as np
 
 from . import _core
 from ._check import deliver, image8
+from ._option import parsed, takes
 from .noise import measured_frame
-from .options import CLOSING, Closing, ScanLineParams, parsed, takes
+from .options import CLOSING, Closing, ScanLineParams
 from .surfaces import surface_map
 
 if TYPE_CHECKING:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
@@ -11,11 +12,12 @@ import numpy as np
 
 from . import _storage
 from ._check import deliver, described, error, fail, public
+from ._option import parsed, takes
 from ._typed import Accessors
 from .edges import EdgeStrength, measure_points, measure_strength
 from .frame import Frame
 from .noise import measured_frame
-from .options import DETECTION, SELECTION, ScanLineParams, Selection, parsed, takes
+from .options import DETECTION, SELECTION, ScanLineParams, Selection
 from .selection import select_strength
 from .thinning import thinEdges
 
@@ -277,10 +279,32 @@ class ScanLineDetector(Accessors):
 
         Thresholds and what else selects edges are those of the detector, where none are given for this frame.
         """
-        thresholds = {"jumpThreshold": jumpThreshold, "creaseThreshold": creaseThreshold}
+        found, _ = self._run(src, mask, jumpThreshold, creaseThreshold, options)
+        return deliver("edges", found, edges)
+
+    @takes(SELECTION, default=_OWN)
+    def detectEdgesWithStrength(
+        self,
+        src: np.ndarray,
+        jumpThreshold: float | None = _OWN,
+        creaseThreshold: float = _OWN,
+        *,
+        mask: np.ndarray | None = None,
+        **options: Unpack[RefinementOptions],
+    ) -> tuple[np.ndarray, EdgeStrength]:
+        """Find the edges, and how strong each is and of which kind, as the function `detectEdgesWithStrength` does.
+
+        detectEdgesWithStrength(src[, jumpThreshold[, creaseThreshold]], *[, mask[, ...]]) -> edges, strength
+        """
+        return self._run(src, mask, jumpThreshold, creaseThreshold, options)
+
+    def _run(
+        self, src: np.ndarray, mask: np.ndarray | None, jump: Any, crease: Any, options: Mapping[str, Any]
+    ) -> tuple[np.ndarray, EdgeStrength]:
+        thresholds = {"jumpThreshold": jump, "creaseThreshold": crease}
         given = {name: value for name, value in thresholds.items() if value is not _OWN}
         params, selection = self._params, replace(self._selection, **given, **options)
-        return deliver("edges", run_detector(measured_frame(src, params, mask), params, selection)[0], edges)
+        return run_detector(measured_frame(src, params, mask), params, selection)
 
     def clear(self) -> None:
         """Give every parameter its default again.

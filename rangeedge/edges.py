@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from . import _core
 from ._check import array, described, fail, integer, number, public
+from ._option import Option, parsed, takes
 from .constants import EDGE_BOUNDARY, EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, EDGE_OCCLUDED, EDGE_OCCLUDING
 from .frame import Frame
 from .noise import measured_frame
-from .options import SCAN_LINES, Option, ScanLineParams, parsed, takes
+from .options import SCAN_LINES, ScanLineParams
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -167,7 +169,8 @@ def edgeStrength(
     src : ndarray
         (H, W) depth, or points (H, W, 3) or (H, W, 4) in the camera frame (x right, y down, z away).
         Integers are divided by `depthFactor` and invalid where <= 0. With `K`, depths that are not positive and
-        finite are invalid; without it, only non-finite values are. Heights (`heightMap`) may not be signed integers.
+        finite are invalid; without it, only non-finite values are. Heights (`heightMap`) may be negative: of signed
+        integers only the least of the type is invalid.
         A point is invalid if a coordinate is not finite, if all are 0, or if it lies behind the viewpoint.
     mask : ndarray of shape (H, W), 8-bit or bool, optional
         Non-zero where pixels are used.
@@ -299,16 +302,14 @@ def _no_strength(shape: tuple[int, int]) -> EdgeStrength:
 
 
 def _kernel_options(params: ScanLineParams) -> _core.ScanLineOptions:
-    """The options of scan lines under their names in the kernel."""
-    options = [option for option in ScanLineParams.options.values() if option.group == "scan lines"]
-    values = {_kernel_name(option): _kernel_value(option, getattr(params, option.name)) for option in options}
-    return _core.ScanLineOptions(**values)
+    """The options of scan lines under their names in the kernel, a choice of two as a bool, 0 for None."""
+    return _core.ScanLineOptions(**{kernel: read(getattr(params, name) or 0) for name, kernel, read in _KERNEL})
 
 
-def _kernel_name(option: Option) -> str:
-    return option.kernel or re.sub(r"([A-Z])", lambda m: "_" + m[1].lower(), option.name)
+def _in_kernel(option: Option) -> tuple[str, str, Callable[[Any], Any]]:
+    """Name of an option, its name in the kernel, and what makes its value there."""
+    snake = re.sub(r"([A-Z])", lambda m: "_" + m[1].lower(), option.name)
+    return option.name, option.kernel or snake, bool if option.choices else type(option.default or 0.0)
 
 
-def _kernel_value(option: Option, value: Any) -> Any:
-    """A choice of two as a bool, and 0 for None."""
-    return bool(value) if option.choices else value or 0
+_KERNEL = [_in_kernel(option) for option in SCAN_LINES.values() if option.group == "scan lines"]

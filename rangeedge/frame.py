@@ -134,23 +134,23 @@ def read_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None 
             if getattr(params, name) is not None:
                 raise fail(name, "None where src holds points", described(getattr(params, name)))
         return _points(src, inside, heightMap)
-    if heightMap and src.dtype.kind == "i":
-        expected = "heights as floats (or unsigned integers, 0 for no data) where heightMap is True"
-        raise fail("src", expected, described(src), cv2.Error.StsUnsupportedFormat)
     if K is not None:
         return _pinhole(src, params.depthFactor, inside, K)
     return _grid(src, params.depthFactor, inside, pixelSize or (1.0, 1.0), heightMap)
 
 
-def _lengths(src: np.ndarray, depthFactor: float) -> np.ndarray:
-    """Values as float lengths, invalid integers as NaN; float32 and float64 arrays are passed on unchanged."""
+def _lengths(src: np.ndarray, depthFactor: float, heightMap: bool = False) -> np.ndarray:
+    """Values as float lengths, invalid integers as NaN; float32 and float64 arrays are passed on unchanged.
+
+    Depths of 0 or less are invalid. Heights may be negative: among signed ones only the least of the type is invalid.
+    """
     if src.dtype.kind == "f":
         return np.ascontiguousarray(src, dtype=np.float64 if src.dtype.itemsize > 4 else np.float32)
     if src.dtype.kind == "b":
         raise fail("src", SRC + " of numbers", described(src), cv2.Error.StsUnsupportedFormat)
     real = np.float32 if src.dtype.itemsize <= 2 else np.float64
     lengths = np.divide(src, real(depthFactor), dtype=real, order="C")
-    lengths[src <= 0] = np.nan
+    lengths[src <= (np.iinfo(src.dtype).min if heightMap else 0)] = np.nan
     return lengths
 
 
@@ -174,7 +174,7 @@ def _grid(
     spacing: tuple[float, float],
     heightMap: bool,
 ) -> Frame:
-    values = _lengths(src, depthFactor)
+    values = _lengths(src, depthFactor, heightMap)
     height = values if heightMap else -values
     infinite = np.isinf(height)
     if infinite.any():

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import _core
+from ._option import parsed, takes
 from .frame import Frame, read_frame
 from .noise_model import NoiseModel, correlation_of
-from .options import GEOMETRY, ScanLineParams, parsed, takes
+from .options import GEOMETRY, ScanLineParams
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -25,8 +26,11 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
 
     Third differences along rows and columns vanish on every quadratic; on noise they have sqrt(20) times its
     deviation. Edges are few among them: sigma is the root mean square of the smaller three quarters, corrected for the
-    trimming. Per bin of depth, a + c z^2 with a, c >= 0 is fitted to it. The correlation is the ratio of the same
-    estimate at a lag of 6 pixels to that between neighbours, between 1 and 2.5.
+    trimming. Per bin of depth, a + c z^2 with a, c >= 0 is fitted to it. Areas of constant values do not count.
+
+    How much fits to n = 4, 8, 16, 32 pixels are off, on one scan line and on neighbouring ones together, is measured
+    likewise: by differences of the values and slopes of adjacent fits that vanish on every quadratic. Whoever detects
+    edges with the model counts with that; its `correlation` sums it up.
 
     Parameters
     ----------
@@ -40,7 +44,8 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
     -------
     retval : NoiseModel
         In the unit of the image. Never below 3e-5 of the distance (of the range of heights on a grid), so that
-        the rounding of noise-free images counts as noise; that is also what is left where no window is valid.
+        the rounding of noise-free images counts as noise, nor below that of rounding to whole units of integers or
+        to another step the values show, step / sqrt(12); that is also what is left where no window is valid.
 
     Raises
     ------

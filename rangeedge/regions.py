@@ -9,11 +9,12 @@ import numpy as np
 
 from . import _core
 from ._check import boolean, image8, labels32s
+from ._option import parsed, takes
 from .detector import run_detector
 from .distance import distanceTransform
 from .frame import Frame
 from .noise import measured_frame
-from .options import GROWING, SEGMENTING, Growing, ScanLineParams, Selection, parsed, takes
+from .options import GROWING, SEGMENTING, Growing, ScanLineParams, Selection
 from .seeds import find_seeds, label_statistics
 from .surfaces import surface_map, surfaces_of
 

@@ -9,7 +9,8 @@ import numpy as np
 
 from . import _core
 from ._check import array, error, fail, image8, image32f
-from .options import SEEDING, Seeding, takes
+from ._option import takes
+from .options import SEEDING, Seeding
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

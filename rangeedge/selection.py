@@ -10,9 +10,10 @@ import numpy as np
 
 from . import _check, _core
 from ._check import public
+from ._option import takes
 from .constants import EDGE_OCCLUDING
 from .edges import EdgeStrength
-from .options import SELECTION, Selection, takes
+from .options import SELECTION, Selection
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack

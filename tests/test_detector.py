@@ -296,6 +296,9 @@ def test_object_finds_what_the_functions_find(scene, detector):
         detector.detectEdges(scene, 0.2, 40, **selection), detectEdges(scene, 0.2, 40, **options, **selection)
     )
     np.testing.assert_array_equal(detector.detectEdges(scene), detectEdges(scene, **options))
+    edges, strength = detector.detectEdgesWithStrength(scene, 0.2, 40, **selection)
+    np.testing.assert_array_equal(edges, detectEdges(scene, 0.2, 40, **options, **selection))
+    np.testing.assert_array_equal(strength.significance, edgeStrength(scene, mask=mask, **options).significance)
     dst = np.zeros(scene.shape, np.uint8)
     assert detector.detectEdges(scene, edges=dst) is dst
 
@@ -426,6 +429,8 @@ def test_clear_empty_name_and_repr(detector):
         {"noise": np.float32([[np.nan, 0.1], [np.inf, 1e-30]])},
         {"pixelSize": 0.7, "K": None},
         {"epsFactor": 7, "depthFactor": 2**40},
+        {"jumpThreshold": np.inf, "creaseThreshold": np.inf},
+        {"jumpThreshold": None},
     ],
     ids=lambda change: "-".join(f"{k}_{type(v).__name__}" for k, v in change.items()) or "all",
 )
@@ -475,6 +480,23 @@ def test_a_file_may_be_written_by_hand(tmp_path, detector):
     )
     detector.load(path)
     same(get_all(detector), {**DEFAULTS, "eps": 1.0, "pixelSize": (2.0, 0.5), "noise": 3.0, "maxGap": 2})
+
+
+def test_a_file_of_version_0_1_is_read(tmp_path, detector):
+    """It has no thresholds."""
+    path = tmp_path / "old.yml"
+    path.write_text(
+        "%YAML:1.0\n---\nsavedBy: rangeedge\nScanLineDetector:\n   eps: 0.25\n   epsFactor: 3.5\n   heightMap: 1\n"
+        "   depthFactor: 1000.\n   noise:\n      a: 0.5\n      b: 0.\n      c: 0.\n      correlation: 1.\n"
+        "   directions: 15\n   fit: 0\n   measure: 0\n   crease: 1\n   maxShift: 4.\n   maxGap: 2\n"
+        "   mergeSignificance: 5.\n   minSignificance: 12.\ncomplete: 1\n"
+    )
+    detector.load(path)
+    old = {"eps": 0.25, "noise": NoiseModel(a=0.5), "heightMap": True, "maxGap": 2}
+    same(get_all(detector), {**DEFAULTS, **old})
+    path.write_text(path.read_text().removesuffix("complete: 1\n"))
+    with pytest.raises(rangeedge.error, match="is not complete"):
+        detector.load(path)
 
 
 BAD_NODES = {

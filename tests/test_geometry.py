@@ -273,3 +273,35 @@ def test_errors_name_the_function(function):
         function(np.zeros(3))
     with pytest.raises(rangeedge.error, match=rf"{function.__name__}: `mask` must be"):
         function(np.zeros((3, 3)), mask=np.zeros((3, 4), np.uint8))
+
+
+def test_points_left_out_do_not_turn_the_viewing_axis():
+    z = np.where(np.arange(60) < 30, 1.0, 1.2) * np.ones((50, 1))
+    K = np.array([[80.0, 0, 29.5], [0, 80, 24.5], [0, 0, 1]])
+    v, u = np.mgrid[:50, :60]
+    points = np.dstack([(u - 29.5) / 80 * z, (v - 24.5) / 80 * z, z])
+    expected = edgeStrength(z, K=K, noise=0.001).jump.max()
+    nothing, behind = points.copy(), points.copy()
+    nothing[3, 4] = 0
+    behind[3, 4] = (0.1, 0.1, -1)
+    mask = np.ones(z.shape, np.uint8)
+    mask[3, 4] = 0
+    for src, inside in ((nothing, None), (nothing, mask), (behind, mask)):
+        assert edgeStrength(src, noise=0.001, mask=inside).jump.max() == pytest.approx(expected, rel=1e-6)
+
+
+def test_masked_arrays_are_refused():
+    heights = np.ma.masked_equal(np.arange(400.0).reshape(20, 20), 7)
+    with pytest.raises(rangeedge.error, match=r"edgeStrength: `src` must be .* got a masked array"):
+        edgeStrength(heights, heightMap=True)
+
+
+def test_whole_heights_may_be_negative():
+    heights = np.arange(-200, 200, dtype=np.int16).reshape(20, 20)
+    heights[3, 4] = -32768
+    frame = frame_of(heights, heightMap=True, depthFactor=10.0)
+    assert frame.valid.sum() == 399
+    assert frame.valid[3, 4] == 0
+    np.testing.assert_array_equal(frame.ordinate[0], np.float32(heights[0] / 10))
+    assert frame_of(heights).valid.sum() == 199
+    assert frame_of(heights.clip(0).astype(np.uint16), heightMap=True).valid.sum() == 199

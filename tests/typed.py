@@ -7,7 +7,8 @@ import textwrap
 from pathlib import Path
 
 from rangeedge import options
-from rangeedge.options import DETECTION, SELECTION, Option
+from rangeedge._option import Option
+from rangeedge.options import DETECTION, SELECTION
 
 TARGET = Path(__file__).resolve().parents[1] / "rangeedge" / "_typed.py"
 KEYWORDS = {

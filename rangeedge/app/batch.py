@@ -14,8 +14,9 @@ import numpy as np
 
 from .. import __version__
 from .._check import boolean, described, error, fail, integer
+from .._option import parsed, takes
 from ..io import RangeImage, imreadRange
-from ..options import DETECTION, ScanLineParams, Selection, parsed, takes
+from ..options import DETECTION, ScanLineParams, Selection
 from .results import EdgeResults, edge_files, find_edges, plain, write_folder
 
 

@@ -12,12 +12,13 @@ import numpy as np
 
 from .. import __version__
 from .._check import integer
+from .._option import parsed, takes
 from ..detector import detectEdges, detectEdgesWithStrength
 from ..distance import distanceTransform, salienceDistanceTransform
 from ..edges import edgePoints, edgeStrength
 from ..frame import read_frame
 from ..noise import estimateNoise
-from ..options import GEOMETRY, ScanLineParams, parsed, takes
+from ..options import GEOMETRY, ScanLineParams
 from ..seeds import extractSeeds
 from ..selection import overallStrength, selectEdges
 from ..thinning import thinEdges

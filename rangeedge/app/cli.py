@@ -16,7 +16,8 @@ import numpy as np
 
 from .. import __version__
 from .._check import error, named
-from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing, Option
+from .._option import Option
+from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing
 from .batch import detect_file, detectBatch, read_image
 from .results import (
     EDGE_FILES,

@@ -19,12 +19,13 @@ import numpy as np
 
 from .. import __version__
 from .._check import described, error, named
+from .._option import parsed, takes
 from ..distance import distanceTransform
 from ..draw import drawOverview, region_overview
 from ..edges import EdgeStrength, measure_both
 from ..frame import Frame
 from ..noise import measured_frame
-from ..options import DETECTION, Growing, ScanLineParams, Selection, parsed, takes
+from ..options import DETECTION, Growing, ScanLineParams, Selection
 from ..regions import described_regions, seeded_regions
 from ..selection import select_strength
 from ..thinning import thinEdges

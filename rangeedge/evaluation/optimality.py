@@ -1,4 +1,4 @@
-"""How near the strength of a crease edge comes to the true angle: the simulation of the paper, 5, and the detector itself."""
+"""How near the strength of a crease comes to the true angle: the simulation of the paper, 5, and the detector."""
 
 from __future__ import annotations
 

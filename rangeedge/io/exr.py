@@ -24,6 +24,8 @@ def read_exr(data: bytes) -> np.ndarray:
             for part in file.parts
             for name, channel in part.channels.items()
         }
+        if not channels:  # OpenEXR leaves out what it cannot unpack
+            raise ValueError("its pixels are truncated or garbled")
         image = np.array(_depth_or_points(channels))  # the pixels belong to the file
     if image.dtype == np.float16:
         image = image.astype(np.float32)

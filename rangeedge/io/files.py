@@ -14,6 +14,7 @@ from .. import _check
 from ..frame import read_frame
 from ..options import ScanLineParams
 from .arrays import read_npy, read_npz, write_npy, write_npz
+from .ascii_grid import is_ascii_grid, read_ascii_grid
 from .atomic import write_atomically
 from .exr import read_exr, write_exr
 from .pcd import is_pcd, read_pcd, write_pcd
@@ -55,6 +56,7 @@ def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None)
       geometry under the names of the keywords; records with fields x, y and z are points;
     - PCD 0.5 to 0.7 (ascii, binary, compressed) and PLY (ascii, binary), organized: the points in the axes of the file.
       In Stanford's scans z grows toward the scanner, which is ``heightMap=True``;
+    - ASCII grids of elevation (ESRI): with pixel size, georeference and ``heightMap=True``;
     - ABW, a Sun rasterfile: points by `abwPoints`;
     - Perceptron: points by `perceptronPoints`;
     - Technical Arts (Michigan), ASCII: points in the axes of the file, taken in parallel along z, which grows toward
@@ -253,6 +255,7 @@ _FORMATS = (
     _Format("NPZ", _begins(b"PK\x03\x04"), read_npz),
     _Format("PLY", _is_ply, read_ply),
     _Format("PCD", is_pcd, read_pcd),
+    _Format("ASCII grid", is_ascii_grid, read_ascii_grid),
     _Format("ABW", _begins(ABW_MAGIC), lambda data: read_abw(data, 2)),
     _Format("Perceptron", is_perceptron, read_perceptron),
     _Format("Technical Arts", is_technical_arts, read_technical_arts),

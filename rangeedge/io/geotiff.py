@@ -39,12 +39,12 @@ def _without_data(image: np.ndarray, nodata: str) -> np.ndarray:
     except ValueError:
         raise ValueError(f"its tag GDAL_NODATA holds {nodata[:40]!r}, no number") from None
     if image.dtype.kind == "f":
-        magnitude = np.abs(image)
-        missing = (magnitude >= _UNREAL) & (magnitude < np.inf)
+        if image.dtype.itemsize > 2:  # half floats end before that
+            magnitude = np.abs(image)
+            image[(magnitude >= _UNREAL) & (magnitude < np.inf)] = np.nan
         if np.isfinite(value):
             with np.errstate(over="ignore"):
-                missing |= image == image.dtype.type(value)
-        image[missing] = np.nan
+                image[image == image.dtype.type(value)] = np.nan
     elif np.isfinite(value) and value == int(value):
         info = np.iinfo(image.dtype)
         if info.min <= value <= info.max:
@@ -79,7 +79,7 @@ def _pixel_size(page: Page, georeference: np.ndarray, rows: int) -> tuple[float,
     """Spacing of columns and rows in the unit of the map; degrees become metres, at the latitude of the middle row."""
     dx, dy = np.hypot(*georeference[:, :2]).tolist()
     if _geo_key(page, _MODEL_TYPE) == _GEOGRAPHIC:
-        latitude = georeference[1] @ (0, rows / 2, 1)
+        latitude = georeference[1] @ (0, (rows - 1) / 2, 1)
         dx, dy = dx * METRES_PER_DEGREE * float(np.cos(np.deg2rad(latitude))), dy * METRES_PER_DEGREE
     return dx, dy
 

@@ -18,6 +18,8 @@ Header = dict[str, list[str]]
 
 def is_pcd(head: bytes) -> bool:
     """Whether the first line that is neither empty nor a comment is one of a PCD header."""
+    if head.startswith(b"# .PCD"):
+        return True
     for line, _ in header_lines(head):
         words = line.split()
         if words and not words[0].startswith("#"):

@@ -1,15 +1,14 @@
-"""PNG by OpenCV, and the simple formats PGM and PFM."""
+"""Pictures of one channel: PNG, PGM and PFM."""
 
 from __future__ import annotations
 
-import threading
+import struct
 import zlib
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 import cv2
 import numpy as np
 
+from .. import _core
 from .source import HEADER_LIMIT, expect_at_least, expect_pixels, expect_unpacked
 from .text import numbers
 
@@ -17,19 +16,9 @@ _PNG_COLOURS = {0: "grey values", 2: "colours", 3: "a palette", 4: "opacity", 6:
 
 
 def read_png(data: bytes) -> np.ndarray:
-    """The pixels, by OpenCV, once the chunks are whole and their size is within bounds."""
-    at, kind = 8, b""
-    while kind != b"IEND":
-        length, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
-        if at + 12 + length > len(data):
-            raise ValueError("it is truncated, or the lengths of its chunks are garbled")
-        body = memoryview(data)[at + 4 : at + 8 + length]
-        if zlib.crc32(body) != int.from_bytes(data[at + 8 + length : at + 12 + length], "big"):
-            raise ValueError(f"it is garbled: a check sum of its chunk {kind.decode('latin-1')!r} is wrong")
-        at += 12 + length
-    width, height = int.from_bytes(data[16:20], "big"), int.from_bytes(data[20:24], "big")
-    bits, colour = data[24], data[25]
-    if data[12:16] != b"IHDR" or bits not in (1, 2, 4, 8, 16) or colour not in _PNG_COLOURS:
+    """Grey values of 16 bits; OpenCV, which reads them too, prints and does not tell what is wrong."""
+    width, height, bits, colour, method, filters, interlaced, packed = _png_chunks(data)
+    if colour not in _PNG_COLOURS or bits not in (1, 2, 4, 8, 16) or method or filters or interlaced > 1:
         raise ValueError("its header is garbled")
     if colour != 0:
         raise ValueError(f"it holds {_PNG_COLOURS[colour]}, no range image, which is a PNG of one channel of 16 bits")
@@ -37,11 +26,51 @@ def read_png(data: bytes) -> np.ndarray:
         raise ValueError(f"it holds {bits} bits (8 bits are too coarse for edges); a range image is a PNG of 16 bits")
     expect_pixels(height, width)
     expect_unpacked(2 * width * height, len(data))
-    with _quiet():
-        picture = cv2.imdecode(np.frombuffer(data, np.uint8), cv2.IMREAD_UNCHANGED)
-    if picture is None:
-        raise ValueError("OpenCV cannot decode it: its pixels are truncated or garbled")
+
+    picture = np.empty((height, width), ">u2")
+    passes = [p for part in (_ADAM7 if interlaced else _WHOLE) if (p := picture[part]).size]
+    size = sum(rows * (1 + 2 * cols) for rows, cols in (p.shape for p in passes))
+    filtered = np.frombuffer(zlib.decompressobj().decompress(packed, size), np.uint8)
+    expect_at_least(len(filtered), size)
+    at = 0
+    for part in passes:
+        rows, cols = part.shape
+        plain = np.empty((rows, 2 * cols), np.uint8)
+        end = at + rows * (1 + 2 * cols)
+        if not _core.png_unfilter(filtered[at:end], 2, plain):
+            raise ValueError("it is garbled: a row has an unknown filter")
+        part[...] = plain.view(">u2")
+        at = end
     return picture
+
+
+# The pixels of each pass.
+_WHOLE = (np.s_[:, :],)
+_ADAM7 = (
+    *(np.s_[::8, ::8], np.s_[::8, 4::8], np.s_[4::8, ::4], np.s_[::4, 2::4]),
+    *(np.s_[2::4, ::2], np.s_[::2, 1::2], np.s_[1::2, :]),
+)
+
+
+def _png_chunks(data: bytes) -> tuple[int, int, int, int, int, int, int, bytes]:
+    """The header's values, and the packed pixels of all chunks that hold them."""
+    header, packed = b"", []
+    at, kind = 8, b""
+    while kind != b"IEND":
+        length, kind = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
+        if at + 12 + length > len(data):
+            raise ValueError("it is truncated, or the lengths of its chunks are garbled")
+        body = memoryview(data)[at + 8 : at + 8 + length]
+        if zlib.crc32(body, zlib.crc32(kind)) != int.from_bytes(data[at + 8 + length : at + 12 + length], "big"):
+            raise ValueError(f"it is garbled: the check sum of its chunk {kind.decode('latin-1')!r} is wrong")
+        if at == 8 and kind == b"IHDR":
+            header = bytes(body)
+        elif kind == b"IDAT":
+            packed.append(body)
+        at += 12 + length
+    if len(header) != 13:
+        raise ValueError("its header is garbled")
+    return *struct.unpack(">IIBBBBB", header), b"".join(packed)
 
 
 def write_png(src: np.ndarray) -> bytes:
@@ -51,31 +80,6 @@ def write_png(src: np.ndarray) -> bytes:
     if not written:
         raise ValueError("what OpenCV can encode")
     return data.tobytes()
-
-
-class _Silence:
-    """How many calls want OpenCV not to print, and the level to return to."""
-
-    lock = threading.Lock()
-    wanted = 0
-    level = 0
-
-
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """OpenCV prints nothing: what goes wrong is told by an exception."""
-    log = cv2.utils.logging
-    with _Silence.lock:
-        if _Silence.wanted == 0:
-            _Silence.level = log.setLogLevel(log.LOG_LEVEL_SILENT)
-        _Silence.wanted += 1
-    try:
-        yield
-    finally:
-        with _Silence.lock:
-            _Silence.wanted -= 1
-            if _Silence.wanted == 0:
-                log.setLogLevel(_Silence.level)
 
 
 def read_pgm(data: bytes) -> np.ndarray:

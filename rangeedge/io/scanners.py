@@ -68,17 +68,19 @@ def read_perceptron(data: bytes) -> np.ndarray:
 
 
 _TECHNICAL_ARTS_HEADER = re.compile(rb"(?:[\x20-\x7e\t\r]{0,200}\n){3}")
+_FIRST_NUMBER = re.compile(rb"\s*[-+]?[\d.]")
 
 
 def is_technical_arts(head: bytes) -> bool:
-    return _TECHNICAL_ARTS_HEADER.match(head) is not None
+    header = _TECHNICAL_ARTS_HEADER.match(head)
+    return header is not None and _FIRST_NUMBER.match(head, header.end()) is not None
 
 
 def read_technical_arts(data: bytes) -> RangeImage:
     """Three lines with the numbers of rows and columns, then the images flag, X, Y and Z as text."""
     start = _TECHNICAL_ARTS_HEADER.match(data[:HEADER_LIMIT]).end()  # type: ignore[union-attr]
     header = data[:start].decode("ascii").lower()
-    sizes = [int(word) for word in re.findall(r"\d{1,9}", header)[:2]]
+    sizes = [int(word) for word in re.findall(r"(?<![\w.+-])\d{1,9}(?![\w.])", header)[:2]]
     if len(sizes) < 2:
         raise ValueError("it is no known text format: its first three lines do not give rows and columns")
     rows, cols = sizes[::-1] if 0 <= header.find("col") < header.find("row") else sizes

@@ -131,8 +131,8 @@ void nearest_in_columns(int height, int width, IsSource is_source, Penalty penal
 
 // sqrt(min over q of |p - q|^2 + penalty(q)) and its label, from the nearest source of every column.
 template <class Penalty>
-void nearest_across_columns(int width, Penalty penalty, int first, int last, const std::int32_t* rows,
-                            float* distance, std::int32_t* labels) {
+void nearest_across_columns(int width, Penalty penalty, int first, int last, const std::int32_t* rows, float* distance,
+                            std::int32_t* labels) {
     Envelope envelope;
     std::vector<double> squared(at(width));
     for (int y = first; y < last; ++y) {

@@ -76,8 +76,8 @@ void edge_strength(const BoundFrame& frame, const ScanLineOptions& options, int 
 }
 
 Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads,
-                                     const Strengths& jump, const Strengths& crease,
-                                     const OutImage<std::uint8_t>& kind, const Strengths& significance) {
+                                     const Strengths& jump, const Strengths& crease, const OutImage<std::uint8_t>& kind,
+                                     const Strengths& significance) {
     std::vector<Candidate> candidates;
     {
         nb::gil_scoped_release release;

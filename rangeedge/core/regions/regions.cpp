@@ -101,8 +101,7 @@ private:
     int patch(int p) const { return patch_[static_cast<std::size_t>(p)]; }
     void assign(int p, int i) {
         patch_[static_cast<std::size_t>(p)] = i;
-        free_[static_cast<std::size_t>(p)] =
-            i || !image_.valid(p) ? taken : image_.open(p) ? open_pixel : edge_pixel;
+        free_[static_cast<std::size_t>(p)] = i || !image_.valid(p) ? taken : image_.open(p) ? open_pixel : edge_pixel;
     }
     bool is_free(int p, Free reach) const {
         const std::uint8_t state = free_[static_cast<std::size_t>(p)];

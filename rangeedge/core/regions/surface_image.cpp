@@ -8,11 +8,11 @@
 namespace rangeedge {
 namespace {
 
-constexpr double flat = 1.25;            // rms in standard deviations up to which a plane is one
-constexpr double curved_gain = 0.8;      // a quadratic must lower the rms to this share
-constexpr double roof_gain = 0.97;          // two planes must lower the rms of the quadratic to this share
+constexpr double flat = 1.25;        // rms in standard deviations up to which a plane is one
+constexpr double curved_gain = 0.8;  // a quadratic must lower the rms to this share
+constexpr double roof_gain = 0.97;   // two planes must lower the rms of the quadratic to this share
 constexpr int roof_rounds = 8;
-constexpr double rounding = 2.5;        // pixels on either side of a ridge
+constexpr double rounding = 2.5;         // pixels on either side of a ridge
 constexpr double correlation_max = 4.0;  // noise over a region, in units of that between pixels
 constexpr double resolution = 1e-6;      // of ordinates in single precision
 constexpr int sample_step = 7;           // one pixel in so many tells the typical noise
@@ -167,8 +167,8 @@ bool SurfaceImage::agree(int p, int q, const Surface& a, const Surface& b, doubl
     const Sample u = sample(p), v = sample(q);
     const double x = (u.x + v.x) / 2, y = (u.y + v.y) / 2;
     const double between = a.value(x, y) - b.value(x, y);
-    const double spread = std::max(variance(at(p), a.slope_x(x, y), a.slope_y(x, y)),
-                                   variance(at(p), b.slope_x(x, y), b.slope_y(x, y)));
+    const double spread =
+        std::max(variance(at(p), a.slope_x(x, y), a.slope_y(x, y)), variance(at(p), b.slope_x(x, y), b.slope_y(x, y)));
     if (between * between > tolerance * tolerance * spread) return false;
     const auto na = normal(a, x, y), nb = normal(b, x, y);
     return na[0] * nb[0] + na[1] * nb[1] + na[2] * nb[2] >= cosine;

@@ -20,17 +20,17 @@ struct RangeMap {
     const float* y;         // null: the row
     const float* ordinate;  // grows toward the viewer, less `offset`; NaN: no data
     double offset;
-    bool projective;                  // the ordinate is inverse depth, else height
-    std::array<double, 6> to_plane;   // (x, y, 1) to normalised image coordinates, or to lengths
-    Noise noise;                      // of lengths
-    const std::uint8_t* edges;        // non-zero: edge; null: none
+    bool projective;                 // the ordinate is inverse depth, else height
+    std::array<double, 6> to_plane;  // (x, y, 1) to normalised image coordinates, or to lengths
+    Noise noise;                     // of lengths
+    const std::uint8_t* edges;       // non-zero: edge; null: none
 };
 
 using Pixels = std::vector<int>;
 
 constexpr double lateral_deviation = 0.15;  // pixels: by how much a sample may stem from beside its line of sight
-constexpr std::size_t least_pixels = 12;  // of a surface
-constexpr std::size_t least_curved = 40;  // of a quadratic
+constexpr std::size_t least_pixels = 12;    // of a surface
+constexpr std::size_t least_curved = 40;    // of a quadratic
 
 // Pixels are known by their index in a copy with a margin of one pixel, so that each has all its neighbours.
 class SurfaceImage {

@@ -3,9 +3,9 @@
 // On a regular grid the plane holds the line and the viewing direction. The curve is y(w): the height y over the place
 // w on the line, both lengths.
 //
-// With a camera the plane holds the line's pixels and the focal point (paper, 4.1, last paragraph). Of the image plane
-// z = 1, the line has the unit direction d and, at the distance `offset` from the origin, the normal n: its pixels lie
-// at w d + offset n. In space the line of sight of such a pixel is
+// With a camera the plane holds the line's pixels and the focal point (paper, 4.1, last paragraph). In the image plane
+// z = 1 let d be the direction of the line, n its normal, both of unit length, and `offset` its distance from the
+// origin along n: its pixels lie at w d + offset n. The line of sight of such a pixel has the direction
 //
 //     (w d + offset n, 1) = w (d, 0) + kappa e,   kappa = |(offset n, 1)| = sqrt(1 + offset^2),
 //
