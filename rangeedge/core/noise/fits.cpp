@@ -20,7 +20,8 @@ constexpr int positions = 80;       // of windows on a scan line, at the most, a
 constexpr int least_step = 8;       // samples from one to the next, at the least
 constexpr int measured_levels = 4;  // n = 4, 8, 16, 32
 constexpr int wave_level = 2;       // n = 16, which tells the waves
-constexpr int longest = 64;         // samples of a window whose residuals are looked at
+constexpr int longest = 64, shortest = 16;  // samples of a window whose residuals are looked at
+constexpr double edge_step = 9;     // deviations by which a step is no noise
 constexpr std::size_t least_windows = 40;  // that tell a deviation
 constexpr std::size_t depth_bins = 6;
 constexpr double most_growth = 1.41;       // of a factor from n to 2 n, beyond what is measured
@@ -104,23 +105,38 @@ struct Step {
     double slope, gap, ordinate;
 };
 
-// What windows of one length show.
-struct Steps {
-    std::vector<Step> single, shared;
-};
-
-// All windows along one direction.
-struct DirectionSteps {
-    Steps levels[measured_levels];
-    std::vector<Step> residuals;  // of long windows: the deviation as `gap`
-};
-
 Step step_of(const LineSums& line, int k, int n) {
     const LineSums::Fit f1 = line.fit(k, n), f2 = line.fit(k + n, n), f3 = line.fit(k + 2 * n, n);
     const double slope = f1.slope - 2 * f2.slope + f3.slope;
     const double gap = f1.mean - 2 * f2.mean + f3.mean - (f3.slope - f1.slope) * n / 2;
     return {slope / std::sqrt(6 / m2(n)), gap / std::sqrt(6.0 / n + n * n / (2 * m2(n))), f2.mean};
 }
+
+// Deviations of steps over the noise at their ordinates.
+class Measure {
+public:
+    Measure(const Deviation& single, const Deviation& waves, bool projective)
+        : single_(single), waves_(waves), projective_(projective) {}
+
+    double sigma(const Step& s, int n) const {
+        const double y = std::abs(s.ordinate);
+        return sigma_of_fit(single_.of_ordinate(y, projective_), waves_.of_ordinate(y, projective_), n);
+    }
+    // Of the slopes or the gaps of fits to n samples; NaN where too few tell it.
+    double factor(const std::vector<Step>& steps, double Step::* number, int n) {
+        sizes_.clear();
+        for (const Step& s : steps) {
+            const double size = std::abs(s.*number) / sigma(s, n);
+            if (std::isfinite(size)) sizes_.push_back(static_cast<float>(size));
+        }
+        return sizes_.size() < least_windows ? std::nan("") : median_deviation(sizes_);
+    }
+
+private:
+    Deviation single_, waves_;
+    bool projective_;
+    std::vector<float> sizes_;
+};
 
 // Calls visit(k) for places of windows of n samples in a line, the same ones whichever end it begins at.
 template <class Visit>
@@ -134,59 +150,125 @@ void for_each_window(int size, int n, Visit&& visit) {
     }
 }
 
-// `lines` scan lines of `size` samples; `line_step` and `sample_step` lead from one to the next.
-template <class T>
-DirectionSteps steps_along(const T* ordinate, int lines, int size, std::ptrdiff_t line_step,
-                           std::ptrdiff_t sample_step, bool silent) {
-    DirectionSteps found;
-    const int groups = std::min(most_groups, lines / neighbours);
-    LineSums sums[neighbours];
-    const auto tells = [silent](const LineSums& line, int k, int n) {
-        return line.valid(k, n) && (silent || !line.constant(k, n));
-    };
-    for (int group = 0; group < groups; ++group) {
-        // Evenly spaced, and the same ones from either side.
-        const int mirrored = groups - 1 - group, room = lines - neighbours;
-        const auto place = [&](int i) { return static_cast<int>((2LL * i + 1) * room / (2LL * groups)); };
-        const int first = group <= mirrored ? place(group) : room - place(mirrored);
-        for (int i = 0; i < neighbours; ++i)
-            sums[i].read(ordinate + (first + i) * line_step, size, sample_step);
+// What windows show along one direction: of one line, and of neighbouring lines together.
+class DirectionSteps {
+public:
+    // Of `lines` scan lines of `size` samples; `line_step` and `sample_step` lead from one to the next. Where the image
+    // is `silent`, constant windows count.
+    template <class T>
+    DirectionSteps(const T* ordinate, int lines, int size, std::ptrdiff_t line_step, std::ptrdiff_t sample_step,
+                   bool silent)
+        : size_(size), silent_(silent) {
+        const int groups = std::min(most_groups, lines / neighbours), room = lines - neighbours;
+        for (int group = 0; group < groups; ++group) {
+            // Evenly spaced, and the same ones from either side.
+            const int mirrored = groups - 1 - group;
+            const auto place = [&](int i) { return static_cast<int>((2LL * i + 1) * room / (2LL * groups)); };
+            const int first = group <= mirrored ? place(group) : room - place(mirrored);
+            for (int i = 0; i < neighbours; ++i) {
+                lines_.emplace_back();
+                lines_.back().read(ordinate + (first + i) * line_step, size, sample_step);
+            }
+        }
+        edges_.assign(lines_.size(), Array<int>(size + 1, 0));
+    }
+
+    // The steps of all lengths, the shorter ones first: where one of these is an edge, longer windows do not count.
+    void look(Measure& measure) {
         for (int level = 0; level < measured_levels; ++level) {
             const int n = 4 << level;
-            Steps& steps = found.levels[level];
-            for_each_window(size, 3 * n, [&](int k) {
-                Step mean{};
-                int told = 0;
-                for (const LineSums& line : sums) {
-                    if (!tells(line, k, 3 * n)) continue;
-                    const Step s = step_of(line, k, n);
-                    steps.single.push_back(s);
-                    mean.slope += s.slope, mean.gap += s.gap, mean.ordinate += s.ordinate;
-                    ++told;
-                }
-                if (told < neighbours) return;
-                const double worth = 1 / std::sqrt(static_cast<double>(neighbours));
-                steps.shared.push_back({worth * mean.slope, worth * mean.gap, mean.ordinate / neighbours});
-            });
+            std::vector<Found> found;
+            for (std::size_t i = 0; i < lines_.size(); ++i)
+                for_each_window(size_, 3 * n, [&](int k) {
+                    if (tells(i, k, 3 * n)) found.push_back({step_of(lines_[i], k, n), i, k});
+                });
+            std::vector<Step>& steps = single[level];
+            for (const Found& f : found) steps.push_back(f.step);
+            add_shared(found, shared[level]);
+            mark_edges(found, measure.factor(steps, &Step::slope, n), measure.factor(steps, &Step::gap, n), n, measure);
         }
-        const int n = std::min(longest, size / 2);
-        if (n <= 8) continue;
-        for (const LineSums& line : sums)
-            for_each_window(size, n, [&](int k) {
-                if (!tells(line, k, n)) return;
-                const double ordinate_there = line.fit(k, n).mean;
-                found.residuals.push_back({0, std::sqrt(line.residual_squares(k, n) / (n - 3)), ordinate_there});
-            });
+        for (int n = longest; n >= shortest && residuals.size() < least_windows; n /= 2) {
+            residuals.clear();
+            for (std::size_t i = 0; i < lines_.size(); ++i)
+                for_each_window(size_, n, [&](int k) {
+                    if (!tells(i, k, n)) return;
+                    const double deviation = std::sqrt(lines_[i].residual_squares(k, n) / (n - 3));
+                    residuals.push_back({0, deviation, lines_[i].fit(k, n).mean});
+                });
+        }
     }
-    return found;
-}
+
+    std::vector<Step> single[measured_levels], shared[measured_levels];
+    std::vector<Step> residuals;  // deviations of samples from long fits, as gaps
+
+private:
+    struct Found {
+        Step step;
+        std::size_t line;
+        int place;
+    };
+
+    bool tells(std::size_t line, int k, int n) const {
+        const LineSums& sums = lines_[line];
+        return sums.valid(k, n) && (silent_ || !sums.constant(k, n)) && edges_[line][k + n] == edges_[line][k];
+    }
+    // The means of the steps of all lines of a group at one place; `found` is in the order of lines, then of places.
+    static void add_shared(const std::vector<Found>& found, std::vector<Step>& shared) {
+        std::vector<Found> group;
+        for (std::size_t i = 0; i < found.size();) {
+            const std::size_t first = i, number = found[i].line / neighbours;
+            while (i < found.size() && found[i].line / neighbours == number) ++i;
+            group.assign(found.begin() + static_cast<std::ptrdiff_t>(first), found.begin() + static_cast<std::ptrdiff_t>(i));
+            std::stable_sort(group.begin(), group.end(), [](const Found& a, const Found& b) { return a.place < b.place; });
+            for (std::size_t j = 0; j + neighbours <= group.size();) {
+                if (group[j].place != group[j + neighbours - 1].place) {
+                    ++j;
+                    continue;
+                }
+                Step sum{};
+                for (std::size_t k = j; k < j + neighbours; ++k) {
+                    const Step& s = group[k].step;
+                    sum.slope += s.slope, sum.gap += s.gap, sum.ordinate += s.ordinate;
+                }
+                const double worth = 1 / std::sqrt(static_cast<double>(neighbours));
+                shared.push_back({worth * sum.slope, worth * sum.gap, sum.ordinate / neighbours});
+                j += neighbours;
+            }
+        }
+    }
+    // Steps far beyond the rest, whose middle window becomes an edge.
+    void mark_edges(const std::vector<Found>& found, double slope, double gap, int n, const Measure& measure) {
+        std::vector<Array<int>> marks(lines_.size(), Array<int>(size_ + 1, 0));
+        for (const Found& f : found) {
+            const double limit = edge_step * measure.sigma(f.step, n);
+            if (!(std::abs(f.step.slope) > limit * slope || std::abs(f.step.gap) > limit * gap)) continue;
+            ++marks[f.line][f.place + n];
+            --marks[f.line][f.place + 2 * n];
+        }
+        for (std::size_t i = 0; i < lines_.size(); ++i) {
+            int inside = 0, before = 0, last = 0;
+            for (int k = 0; k < size_; ++k) {
+                inside += marks[i][k];
+                const int here = edges_[i][k + 1] - last;  // marked before
+                last = edges_[i][k + 1];
+                before += here > 0 || inside > 0;
+                edges_[i][k + 1] = before;
+            }
+        }
+    }
+
+    int size_;
+    bool silent_;
+    std::vector<LineSums> lines_;
+    std::vector<Array<int>> edges_;  // of every line, how many samples before the k-th one lie on an edge
+};
 
 // How the deviation of |D| for n = 16 grows with depth, in units of `single` on the whole.
-Deviation waves_of(const DirectionSteps (&found)[2], bool projective, const Deviation& single) {
+Deviation waves_of(const std::vector<DirectionSteps>& found, bool projective, const Deviation& single) {
     if (!projective) return single;
     std::vector<Step> steps;
     for (const DirectionSteps& f : found) {
-        const auto& own = f.levels[wave_level].single;
+        const std::vector<Step>& own = f.single[wave_level];
         steps.insert(steps.end(), own.begin(), own.end());
     }
     if (steps.size() < depth_bins * least_windows) return single;
@@ -214,30 +296,6 @@ Deviation waves_of(const DirectionSteps (&found)[2], bool projective, const Devi
     return shape.times(static_cast<double>(*middle));
 }
 
-// Deviations of steps over the noise at their ordinates.
-class Measure {
-public:
-    Measure(const Deviation& single, const Deviation& waves, bool projective)
-        : single_(single), waves_(waves), projective_(projective) {}
-
-    // Of the slopes or the gaps of fits to n samples; NaN where too few tell it.
-    double factor(const std::vector<Step>& steps, double Step::* number, int n) {
-        sizes_.clear();
-        for (const Step& s : steps) {
-            const double y = std::abs(s.ordinate);
-            const double sigma = sigma_of_fit(single_.of_ordinate(y, projective_), waves_.of_ordinate(y, projective_), n);
-            const double size = std::abs(s.*number) / sigma;
-            if (std::isfinite(size)) sizes_.push_back(static_cast<float>(size));
-        }
-        return sizes_.size() < least_windows ? std::nan("") : median_deviation(sizes_);
-    }
-
-private:
-    Deviation single_, waves_;
-    bool projective_;
-    std::vector<float> sizes_;
-};
-
 // Factors at all levels from those that are measured, the rest by how the last ones grow.
 void write_factors(const double* measured, double* factors) {
     double last = 1, before = 1;
@@ -252,12 +310,11 @@ void write_factors(const double* measured, double* factors) {
 void write_fit_noise(const DirectionSteps& found, Measure& measure, double* numbers) {
     double measured[4][measured_levels];
     for (int level = 0; level < measured_levels; ++level) {
-        const Steps& steps = found.levels[level];
         const int n = 4 << level;
-        measured[0][level] = measure.factor(steps.single, &Step::slope, n);
-        measured[1][level] = measure.factor(steps.single, &Step::gap, n);
-        measured[2][level] = measure.factor(steps.shared, &Step::slope, n);
-        measured[3][level] = measure.factor(steps.shared, &Step::gap, n);
+        measured[0][level] = measure.factor(found.single[level], &Step::slope, n);
+        measured[1][level] = measure.factor(found.single[level], &Step::gap, n);
+        measured[2][level] = measure.factor(found.shared[level], &Step::slope, n);
+        measured[3][level] = measure.factor(found.shared[level], &Step::gap, n);
     }
     for (int kind = 0; kind < 4; ++kind)
         write_factors(measured[kind], numbers + kind * FitFactors::levels);
@@ -277,18 +334,19 @@ void write_fit_noise(const DirectionSteps& found, Measure& measure, double* numb
 template <class T>
 FitNoiseEstimate fit_noise(const T* ordinate, int rows, int cols, bool projective, const Deviation& single,
                            bool silent, int threads) {
-    DirectionSteps found[2];
+    std::vector<DirectionSteps> found;
+    found.emplace_back(ordinate, rows, cols, cols, 1, silent);
+    found.emplace_back(ordinate, cols, rows, 1, cols, silent);
     Team team(std::min(threads, 2));
     parallel_for(2, team, [&](int begin, int end, int) {
-        for (int i = begin; i < end; ++i)
-            found[i] = i == 0 ? steps_along(ordinate, rows, cols, cols, 1, silent)
-                              : steps_along(ordinate, cols, rows, 1, cols, silent);
+        Measure measure(single, single, projective);
+        for (int i = begin; i < end; ++i) found[static_cast<std::size_t>(i)].look(measure);
     });
     FitNoiseEstimate estimate{};
     estimate.waves = waves_of(found, projective, single);
     parallel_for(2, team, [&](int begin, int end, int) {
         Measure measure(single, estimate.waves, projective);
-        for (int i = begin; i < end; ++i) write_fit_noise(found[i], measure, i == 0 ? estimate.rows : estimate.cols);
+        for (int i = begin; i < end; ++i) write_fit_noise(found[static_cast<std::size_t>(i)], measure, i == 0 ? estimate.rows : estimate.cols);
     });
     return estimate;
 }
