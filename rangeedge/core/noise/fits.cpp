@@ -23,7 +23,7 @@ constexpr int wave_level = 2;       // n = 16, which tells the waves
 constexpr int longest = 64, shortest = 16;  // samples of a window whose residuals are looked at
 constexpr double edge_step = 9;     // deviations by which a step is no noise
 constexpr std::size_t least_windows = 40;  // that tell a deviation
-constexpr std::size_t depth_bins = 6;
+constexpr std::size_t depth_bins = 12;
 constexpr double most_growth = 1.41;       // of a factor from n to 2 n, beyond what is measured
 constexpr double smooth_growth = 5.66;     // the same of waves without an end, 2^2.5: more than that is no noise
 constexpr double value_per_slope = 0.5;    // of factors, at the least: a wrong slope makes the value at the end wrong

@@ -1,6 +1,7 @@
 // A range image and its noise as Python hands them over: once, for every kernel to use.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <variant>
@@ -15,8 +16,8 @@ using FitsArray = std::array<double, 4 + 2 * FitNoise::size>;
 
 // They keep the arrays alive to which their kernels' side points.
 struct BoundNoise {
-    BoundNoise(double a, double b, double c, const FitsArray& fits, Image<float> map)
-        : map(map) {
+    BoundNoise(double a, double b, double c, const FitsArray& fits, Image<float> deviations)
+        : map(deviations) {
         noise.single = {a, b, c, 0};
         noise.waves = {fits[0], fits[1], fits[2], fits[3]};
         noise.rows = FitNoise(&fits[4]);
@@ -25,7 +26,7 @@ struct BoundNoise {
         for (std::size_t i = 0; i < FitNoise::size; ++i)
             diagonals[i] = std::sqrt(fits[4 + i] * fits[4 + FitNoise::size + i]);
         noise.diagonals = FitNoise(diagonals);
-        noise.map = map.data();
+        noise.map = deviations.data();
     }
 
     Image<float> map;
@@ -36,15 +37,15 @@ struct BoundFrame {
     using Samples = nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>;
 
     template <class T>
-    BoundFrame(nb::ndarray<const T, nb::c_contig, nb::device::cpu> samples, bool projective,
+    BoundFrame(nb::ndarray<const T, nb::c_contig, nb::device::cpu> values, bool projective,
                const std::array<double, 6>& to_plane, const std::array<double, 3>& axis, const BoundNoise& noise)
-        : samples(samples), map(noise.map) {
-        const bool points = samples.ndim() == 3;
+        : samples(values), map(noise.map) {
+        const bool points = values.ndim() == 3;
         Frame<T> own{};
-        own.rows = rows(samples);
-        own.cols = cols(samples);
-        own.ordinate = points ? nullptr : samples.data();
-        own.points = points ? samples.data() : nullptr;
+        own.rows = rows(values);
+        own.cols = cols(values);
+        own.ordinate = points ? nullptr : values.data();
+        own.points = points ? values.data() : nullptr;
         own.projective = projective;
         std::copy(to_plane.begin(), to_plane.end(), own.to_plane);
         std::copy(axis.begin(), axis.end(), own.axis);

@@ -17,12 +17,12 @@ namespace {
 // The maps on which surfaces are fitted, of a frame whose geometry and noise they share.
 struct BoundMap {
     BoundMap(const BoundFrame& bound, Image<float> x, Image<float> y, Image<float> ordinate, double offset,
-             const std::array<double, 6>& to_plane, Image<std::uint8_t> edges)
-        : arrays{x, y, ordinate, bound.map}, edges(edges) {
+             const std::array<double, 6>& to_plane, Image<std::uint8_t> edge_map)
+        : arrays{x, y, ordinate, bound.map}, edges(edge_map) {
         std::visit(
             [&](const auto& frame) {
                 map = {frame.rows, frame.cols,       x.data(), y.data(),    ordinate.data(),
-                       offset,     frame.projective, to_plane, frame.noise, edges.data()};
+                       offset,     frame.projective, to_plane, frame.noise, edge_map.data()};
             },
             bound.frame);
     }
