@@ -234,7 +234,7 @@ class ScanLineParams(Options):
         metavar="N",
     )
     mergeSignificance: float = option(
-        3.0,
+        3.5,
         _real(0),
         "float",
         "Cuts are taken back where that raises the sum of squared residuals by less than its square, in variances of"
@@ -243,7 +243,7 @@ class ScanLineParams(Options):
         group="scan lines",
     )
     minSignificance: float = option(
-        6.0,
+        7.0,
         _real(0),
         "float",
         "Candidates are dropped whose significance, joined with that of their neighbours, is below this; 0 keeps all.",
@@ -295,7 +295,7 @@ class Selection(Options):
         metavar="N",
     )
     lineSignificance: float = option(
-        12.0,
+        15.0,
         _real(0),
         "float",
         "Significance that a connected line must reach somewhere, as `minSignificance` is what each of its pixels must"
