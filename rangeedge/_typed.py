@@ -43,6 +43,7 @@ class ScanLineOptions(TypedDict, total=False):
 class RefinementOptions(TypedDict, total=False):
     hysteresis: float
     minLength: int
+    lineSignificance: float
     dynamic: bool
     boundaryEdges: bool
 
@@ -415,6 +416,22 @@ class Accessors:
         Least length of a connected line, >= 1: the longer side of its bounding box.
         """
         self._set("minLength", minLength)
+
+    def getLineSignificance(self) -> float:
+        """getLineSignificance() -> retval
+
+        Significance that a connected line must reach somewhere, as `minSignificance` is what each of its pixels must
+        have; 0 keeps all lines.
+        """
+        return self._selection.lineSignificance
+
+    def setLineSignificance(self, lineSignificance: float, /) -> None:
+        """setLineSignificance(lineSignificance) -> None
+
+        Significance that a connected line must reach somewhere, as `minSignificance` is what each of its pixels must
+        have; 0 keeps all lines.
+        """
+        self._set("lineSignificance", lineSignificance)
 
     def getDynamic(self) -> bool:
         """getDynamic() -> retval

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _core
 from ._check import array, described, error, fail, image8
-from .noise_model import NoiseModel
+from .noise_model import WHITE, NoiseModel
 from .options import ScanLineParams
 
 _THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
@@ -25,7 +25,8 @@ class Frame:
     `samples` holds inverse depth (`projective`) or height of shape (H, W), or points of shape (H, W, 3).
     `to_plane` takes (column, row, 1) to normalised image coordinates or to lengths; `axis` is the viewing direction;
     `heightMap` says that heights grow toward the viewer in the image, too; `spaced` that the spacing of pixels is known
-    in the unit of the values. `noise` is a model or a map of deviations.
+    in the unit of the values. `step` is the length to whose multiples the values were rounded, 0 if none is known.
+    `noise` is a model or a map of deviations.
     """
 
     samples: np.ndarray
@@ -34,6 +35,7 @@ class Frame:
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
     heightMap: bool = False
     spaced: bool = True
+    step: float = 0.0
     noise: NoiseModel | np.ndarray | None = None
 
     @property
@@ -114,9 +116,9 @@ class Frame:
     def kernel(self) -> _core.Frame:
         """The image with its noise as every kernel takes it."""
         if isinstance(self.noise, np.ndarray):
-            noise = _core.Noise(0.0, 0.0, 0.0, 1.0, self.noise)
+            noise = _core.Noise(0.0, 0.0, 0.0, WHITE, self.noise)
         else:
-            noise = _core.Noise(self.noise.a, self.noise.b, self.noise.c, self.noise.correlation)
+            noise = _core.Noise(self.noise.a, self.noise.b, self.noise.c, self.noise.of_fits())
         return _core.Frame(self.samples, self.projective, self.to_plane, self.axis, noise)
 
 
@@ -154,12 +156,17 @@ def _lengths(src: np.ndarray, depthFactor: float, heightMap: bool = False) -> np
     return lengths
 
 
+def _step(src: np.ndarray, depthFactor: float) -> float:
+    """The length of one unit of integers."""
+    return 1 / depthFactor if src.dtype.kind in "iu" else 0.0
+
+
 def _pinhole(src: np.ndarray, depthFactor: float, inside: np.ndarray | None, K: np.ndarray) -> Frame:
     # The kernel divides by the factor what depth cameras give; other integers are divided here.
     depth = np.ascontiguousarray(src) if src.dtype == np.uint16 else _lengths(src, depthFactor)
     inverse = np.empty(depth.shape, np.float32 if depth.dtype == np.uint16 else depth.dtype)
     _core.invert_depth(depth, depthFactor, None if inside is None else inside.view(np.uint8), inverse)
-    return Frame(inverse, True, tuple(np.linalg.inv(K)[:2].ravel().tolist()))
+    return Frame(inverse, True, tuple(np.linalg.inv(K)[:2].ravel().tolist()), step=_step(src, depthFactor))
 
 
 def _grid(
@@ -178,9 +185,8 @@ def _grid(
         height = height.copy() if np.shares_memory(height, src) else height
         height[~inside] = np.nan
     dx, dy = pixelSize or (1.0, 1.0)
-    return Frame(
-        height, False, (dx, 0.0, 0.0, 0.0, dy, 0.0), heightMap=heightMap, spaced=pixelSize is not None
-    )
+    frame = Frame(height, False, (dx, 0.0, 0.0, 0.0, dy, 0.0), heightMap=heightMap, spaced=pixelSize is not None)
+    return replace(frame, step=_step(src, depthFactor))
 
 
 def _points(src: np.ndarray, inside: np.ndarray | None, heightMap: bool) -> Frame:

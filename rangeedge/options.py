@@ -250,7 +250,7 @@ class ScanLineParams(Options):
         kernel="shadows",
     )
     mergeSignificance: float = option(
-        5.0,
+        3.5,
         _real(0),
         "float",
         "Cuts are taken back where that raises the sum of squared residuals by less than its square, in variances of"
@@ -259,7 +259,7 @@ class ScanLineParams(Options):
         group="scan lines",
     )
     minSignificance: float = option(
-        12.0,
+        7.0,
         _real(0),
         "float",
         "Candidates are dropped whose significance, joined with that of their neighbours, is below this; 0 keeps all.",
@@ -308,6 +308,13 @@ class Selection(Options):
         "int",
         "Least length of a connected line, >= 1: the longer side of its bounding box.",
         unit="pixels",
+    )
+    lineSignificance: float = option(
+        15.0,
+        _real(0),
+        "float",
+        "Significance that a connected line must reach somewhere, as `minSignificance` is what each of its pixels must"
+        " have; 0 keeps all lines.",
     )
     dynamic: bool = option(
         False,

@@ -20,7 +20,7 @@ namespace rangeedge {
 namespace {
 
 constexpr double lone_significance = 3;   // standard deviations that a candidate needs by itself, before its neighbours
-constexpr double jump_significance = 12;  // standard deviations that a jump needs by itself
+constexpr double lone_jump = 8;             // standard deviations that a jump needs by itself
 constexpr double jump_tolerances = 2;     // tolerances of splitting that a jump exceeds, the error of approximation
 constexpr int least_outlined = 3;         // samples of a surface beside a wide gap
 
@@ -60,11 +60,11 @@ private:
         const int gap = right.first - left.last - 1, shorter = std::min(left.size(), right.size());
         if (gap > options_.max_gap) {
             if (shorter < least_outlined) return {};
-            return measure_outline(line, a.curves[i], a.curves[i + 1], left.last, right.first);
+            return measure_outline(line, a, i, i + 1, left.last, right.first);
         }
         if (gap > 0 && shorter < 2) return {};  // a single sample tells nothing of what is beyond a gap
         const Position edge = adapted_position(line, a, i, options_.max_shift);     // paper, 4.2, Fig. 5
-        return measure(line, a.curves[i], a.curves[i + 1], edge, gap + 1);  // paper, 4.2, Fig. 4
+        return measure(line, a, i, i + 1, edge, gap + 1);                           // paper, 4.2, Fig. 4
     }
 
     // The jump of a smeared step after segment i; `smeared` receives its pixels. Returns the segment on its other side,
@@ -73,12 +73,11 @@ private:
                                    std::vector<std::int32_t>& smeared) const {
         const SmearedStep step = smeared_step(line, a, i, options_);
         if (step.next == i) return i;
-        const Curve &f = a.curves[i], &g = a.curves[step.next];
         const double x = (line.abscissa(step.before) + line.abscissa(step.after)) / 2;
         const Position edge{step.before, step.after, x, (step.before + step.after) / 2.0, 0, false};
         const int samples = a.segments[step.next].first - a.segments[i].last;
-        candidate = step.gap > options_.max_gap ? measure_outline(line, f, g, step.before, step.after)
-                                                : measure(line, f, g, edge, samples);
+        candidate = step.gap > options_.max_gap ? measure_outline(line, a, i, step.next, step.before, step.after)
+                                                : measure(line, a, i, step.next, edge, samples);
         if (!(candidate.kind & jump_bit)) return i;
         for (int k = step.before + 1; k < step.after; ++k)
             if (line.ordinate(k) == line.ordinate(k)) smeared.push_back(static_cast<std::int32_t>(line.pixel(k)));
@@ -86,13 +85,14 @@ private:
     }
 
     // The jump at the end of the nearer of two surfaces, half a sample beyond it.
-    Candidate measure_outline(const Line<T>& line, const Curve& f, const Curve& g, int before, int after) const {
+    Candidate measure_outline(const Line<T>& line, const Approximation& a, std::ptrdiff_t i, std::ptrdiff_t j, int before,
+                              int after) const {
         if (!options_.shadows) return {};
-        const ShadowStep step = step_across_shadow(line, f, g, before, after, options_.spaced);
+        const ShadowStep step = step_across_shadow(line, a.fit(i), a.fit(j), before, after, options_.spaced);
         if (!is_jump(line, before, after, step.difference, step.difference / step.deviation)) return {};
         Candidate c{};
         c.jump = within_range(step.jump);
-        c.significance = std::min(static_cast<float>(step.difference / step.deviation), endless);
+        c.significance = std::min(static_cast<float>(step.difference / step.shared_deviation), endless);
         c.kind = static_cast<std::uint8_t>(jump_bit | (step.before_nearer ? occluding_bit : occluded_bit));
         locate(c, line, {before, after, 0, step.before_nearer ? before + 0.5 : after - 0.5, 0, false});
         return c;
@@ -101,15 +101,17 @@ private:
     // A jump exceeds the error of the approximation, and is significant without its neighbours.
     static bool is_jump(const Line<T>& line, int before, int after, double difference, double significance) {
         const double tolerance = std::max(line.tolerance_at(before), line.tolerance_at(after));
-        return difference > jump_tolerances * tolerance && significance > jump_significance;
+        return difference > jump_tolerances * tolerance && significance > lone_jump;
     }
 
     static float within_range(double jump) {
         return static_cast<float>(std::min(jump, static_cast<double>(std::numeric_limits<float>::max())));
     }
 
-    // From one curve to the other it is `steps` samples.
-    Candidate measure(const Line<T>& line, const Curve& f, const Curve& g, const Position& edge, int steps) const {
+    // From segment i to segment j, it is `steps` samples.
+    Candidate measure(const Line<T>& line, const Approximation& a, std::ptrdiff_t i, std::ptrdiff_t j,
+                      const Position& edge, int steps) const {
+        const Curve &f = a.curves[i], &g = a.curves[j];
         const double x = edge.abscissa;
         const EdgeSide f1 = options_.endpoint ? from_endpoint(line, f, edge.before, x) : at_midpoint(line, f, x);
         const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_midpoint(line, g, x);
@@ -117,27 +119,32 @@ private:
         double jump = edge.intersects ? 0 : std::min(jump_strength(line, f1, f2), most);
         double crease = crease_strength(f1, f2);
 
-        const double sigma = line.sigma_between(edge.before, edge.after);
+        const int n1 = a.segments[i].size(), n2 = a.segments[j].size();
+        const FitDeviation slope1 = slope_deviation(line, edge.before, n1, f1.slope_variance);
+        const FitDeviation slope2 = slope_deviation(line, edge.after, n2, f2.slope_variance);
+        const FitDeviation of_jump = jump_deviation(value_deviation(line, edge.before, n1, f1.value_variance),
+                                                    value_deviation(line, edge.after, n2, f2.value_variance));
+        const FitDeviation of_crease = crease_deviation(f1, slope1, f2, slope2);
         const double difference = std::abs(f1.ordinate - f2.ordinate);
-        double of_jump = difference / jump_deviation(f1, f2, sigma);
-        double of_crease = crease / crease_deviation(f1, f2, sigma);
+        double jump_significance = difference / of_jump.shared, crease_significance = crease / of_crease.shared;
         const double least = std::min(lone_significance, options_.min_significance);
-        if (!std::isfinite(jump) || !(of_jump >= least)) jump = of_jump = 0;
-        if (!std::isfinite(crease) || !(of_crease >= least)) crease = of_crease = 0;
-        bool jumps = jump > 0 && is_jump(line, edge.before, edge.after, difference, of_jump);
-        if (jumps && is_smooth(line, edge.before, edge.after, steps, difference)) jump = of_jump = 0, jumps = false;
-        if (jumps) crease = of_crease = 0;
+        if (!std::isfinite(jump) || !(difference >= least * of_jump.single)) jump = jump_significance = 0;
+        if (!std::isfinite(crease) || !(crease >= least * of_crease.single)) crease = crease_significance = 0;
+        bool jumps = jump > 0 && is_jump(line, edge.before, edge.after, difference, difference / of_jump.single);
+        if (jumps && is_smooth(line, edge.before, edge.after, steps, difference))
+            jump = jump_significance = 0, jumps = false;
+        if (jumps) crease = crease_significance = 0;
 
         Candidate c{};
         c.jump = within_range(jump);
         c.crease = static_cast<float>(crease);
-        const double significance = jump > 0 ? std::max(of_jump, of_crease) : of_crease;
+        const double significance = jump > 0 ? std::max(jump_significance, crease_significance) : crease_significance;
         c.significance = std::min(static_cast<float>(significance), endless);
         if (jumps) c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
         if (crease > 0) c.kind |= is_convex(f1, f2) ? convex_bit : concave_bit;
         locate(c, line, edge);
-        c.sides[0] = side(line, f1);
-        c.sides[1] = side(line, f2);
+        c.sides[0] = side(line, f1, slope1.single);
+        c.sides[1] = side(line, f2, slope2.single);
         return c;
     }
 
@@ -154,9 +161,10 @@ private:
         c.plane_position[1] = static_cast<float>(w * d[1] + line.offset * d[0]);
     }
 
-    static Side side(const Line<T>& line, const EdgeSide& f) {
+    static Side side(const Line<T>& line, const EdgeSide& f, double slope_deviation) {
+        const double deviation = slope_deviation * line.per_step;
         return {static_cast<float>(f.ordinate), static_cast<float>(f.slope * line.per_step),
-                std::min(static_cast<float>(f.slope_variance * line.per_step * line.per_step), endless)};
+                std::min(static_cast<float>(deviation * deviation), endless)};
     }
 
     const ScanLineOptions& options_;

@@ -5,15 +5,16 @@
 #include <cmath>
 
 #include "edges/smear.hpp"
+#include "edges/strength.hpp"
 
 namespace rangeedge {
 
 template <class T>
-ShadowStep step_across_shadow(const Line<T>& line, const Curve& f, const Curve& g, int before, int after, bool spaced) {
+ShadowStep step_across_shadow(const Line<T>& line, const Fit& f, const Fit& g, int before, int after, bool spaced) {
     const double x1 = line.abscissa(before), x2 = line.abscissa(after);
     ShadowStep step;
-    step.before_nearer = f.value(x1) > g.value(x2);
-    const Curve &near = step.before_nearer ? f : g, &far = step.before_nearer ? g : f;
+    step.before_nearer = f.curve.value(x1) > g.curve.value(x2);
+    const Curve &near = (step.before_nearer ? f : g).curve, &far = (step.before_nearer ? g : f).curve;
     const double x_near = step.before_nearer ? x1 : x2, x_far = step.before_nearer ? x2 : x1;
     // The end of the nearer surface, above that of the farther one and above the place to which that runs on.
     const double end = near.value(x_near), beyond = far.value(x_far), below = far.value(x_near);
@@ -22,12 +23,14 @@ ShadowStep step_across_shadow(const Line<T>& line, const Curve& f, const Curve& 
     step.jump = std::min(line.depth(beyond), line.depth(below)) - line.depth(end);
     step.difference = end - std::max(beyond, below);
     if (!spaced) step.difference = std::min(step.difference, near.value(x_far) - beyond);
-    const double variance = f.value_variance(x_near) + g.value_variance(x_near);
-    step.deviation = line.sigma_between(before, after) * std::sqrt(variance);
+    const FitDeviation deviation =
+        jump_deviation(value_deviation(line, before, f.samples, f.curve.value_variance(x_near)),
+                       value_deviation(line, after, g.samples, g.curve.value_variance(x_near)));
+    step.deviation = deviation.single, step.shared_deviation = deviation.shared;
     return step;
 }
 
-template ShadowStep step_across_shadow(const Line<float>&, const Curve&, const Curve&, int, int, bool);
-template ShadowStep step_across_shadow(const Line<double>&, const Curve&, const Curve&, int, int, bool);
+template ShadowStep step_across_shadow(const Line<float>&, const Fit&, const Fit&, int, int, bool);
+template ShadowStep step_across_shadow(const Line<double>&, const Fit&, const Fit&, int, int, bool);
 
 }  // namespace rangeedge

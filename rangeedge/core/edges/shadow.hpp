@@ -15,13 +15,14 @@ namespace rangeedge {
 // The step from the sample before a gap to that after it, a length, and its difference of ordinates with the standard
 // deviation of that; not positive where there is none.
 struct ShadowStep {
-    double jump = 0, difference = 0, deviation = 0;
+    double jump = 0, difference = 0;
+    double deviation = 0, shared_deviation = 0;  // of one line, and of neighbouring lines together
     bool before_nearer = false;
 };
 
-// From the curve f before the gap to g after it. Unless pixels are `spaced` there are no angles to the line of sight; then
+// From the fit f before the gap to g after it. Unless pixels are `spaced` there are no angles to the line of sight; then
 // the nearer surface must not run on to the end of the farther one either.
 template <class T>
-ShadowStep step_across_shadow(const Line<T>& line, const Curve& f, const Curve& g, int before, int after, bool spaced);
+ShadowStep step_across_shadow(const Line<T>& line, const Fit& f, const Fit& g, int before, int after, bool spaced);
 
 }  // namespace rangeedge

@@ -35,6 +35,24 @@ struct EdgeSide {
     double angle_per_slope;
 };
 
+// A standard deviation by the noise, of what one scan line tells, and of what it tells as one of several neighbours.
+struct FitDeviation {
+    double single, shared;
+};
+
+// Of the slope and of the value of a fit to n samples beside sample k, by their variances for white noise of unit
+// variance.
+template <class T>
+FitDeviation slope_deviation(const Line<T>& line, int k, int n, double variance) {
+    const double white = line.noise_at(k).of_fit(n) * std::sqrt(variance);
+    return {line.noise->slope[n] * white, line.noise->shared_slope[n] * white};
+}
+template <class T>
+FitDeviation value_deviation(const Line<T>& line, int k, int n, double variance) {
+    const double white = line.noise_at(k).of_fit(n) * std::sqrt(variance);
+    return {line.noise->value[n] * white, line.noise->shared_value[n] * white};
+}
+
 // First form: the curve at the position x of the edge.
 template <class T>
 EdgeSide at_midpoint(const Line<T>& line, const Curve& f, double x) {
@@ -97,13 +115,14 @@ inline double crease_strength(const EdgeSide& f1, const EdgeSide& f2) {
 // f1' > f2': on a grid, with the tangents (1, -f1') and (1, -f2'), their cross product is f1' - f2'.
 inline bool is_convex(const EdgeSide& f1, const EdgeSide& f2) { return cross(f1.tangent, f2.tangent) > 0; }
 
-// The standard deviations of f1(x) - f2(x), an ordinate, and of the crease, for samples of deviation sigma.
-inline double jump_deviation(const EdgeSide& f1, const EdgeSide& f2, double sigma) {
-    return sigma * std::sqrt(f1.value_variance + f2.value_variance);
+// The standard deviations of f1(x) - f2(x), an ordinate, and of the crease in degrees, by those of values and slopes.
+inline FitDeviation jump_deviation(const FitDeviation& value1, const FitDeviation& value2) {
+    return {std::hypot(value1.single, value2.single), std::hypot(value1.shared, value2.shared)};
 }
-inline double crease_deviation(const EdgeSide& f1, const EdgeSide& f2, double sigma) {
-    const double a1 = f1.angle_per_slope, a2 = f2.angle_per_slope;
-    return degrees_per_radian * sigma * std::sqrt(a1 * a1 * f1.slope_variance + a2 * a2 * f2.slope_variance);
+inline FitDeviation crease_deviation(const EdgeSide& f1, const FitDeviation& slope1, const EdgeSide& f2,
+                                     const FitDeviation& slope2) {
+    const double a1 = degrees_per_radian * f1.angle_per_slope, a2 = degrees_per_radian * f2.angle_per_slope;
+    return {std::hypot(a1 * slope1.single, a2 * slope2.single), std::hypot(a1 * slope1.shared, a2 * slope2.shared)};
 }
 
 }  // namespace rangeedge

@@ -94,8 +94,9 @@ void flying_pixels(const BoundFrame& bound, const ScanLineOptions& options, int 
     std::visit([&](const auto& frame) { find_candidates(frame, options, threads, flying.data()); }, bound.frame);
 }
 
-void keep_long_components(const Image<std::uint8_t>& edges, int min_length, const OutImage<std::uint8_t>& kept) {
-    long_components(edges.data(), rows(edges), cols(edges), min_length, kept.data());
+void bound_keep_lines(const Image<std::uint8_t>& edges, int min_length, const Image<float>& significance, float min_peak,
+                      const OutImage<std::uint8_t>& kept) {
+    keep_lines(edges.data(), rows(edges), cols(edges), min_length, significance.data(), min_peak, kept.data());
 }
 
 void thin_to_lines(const Image<std::uint8_t>& edges, const Image<std::uint8_t>& preferred, int spur_length,
@@ -121,9 +122,10 @@ void bind_edges(nb::module_& m) {
     m.def("edge_strength_and_candidates", &edge_strength_and_candidates, "frame"_a, "options"_a, "threads"_a,
           array("jump"), array("crease"), array("kind"), array("significance"));
     m.def("flying_pixels", &flying_pixels, "frame"_a, "options"_a, "threads"_a, array("flying"), Unlocked());
-    m.def("long_components", &keep_long_components, array("edges"), "min_length"_a, array("kept"), Unlocked());
     m.def("thin_lines", &thin_to_lines, array("edges"), optional_array("preferred"), "spur_length"_a, array("thin"),
           Unlocked());
+    m.def("keep_lines", &bound_keep_lines, array("edges"), "min_length"_a, optional_array("significance"), "min_peak"_a,
+          array("kept"), Unlocked());
 }
 
 }  // namespace rangeedge::python

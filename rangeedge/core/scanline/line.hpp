@@ -38,9 +38,6 @@
 
 namespace rangeedge {
 
-enum Direction : std::uint8_t { rows_bit = 1, cols_bit = 2, diag45_bit = 4, diag135_bit = 8 };
-constexpr Direction all_directions[] = {rows_bit, cols_bit, diag45_bit, diag135_bit};
-
 // The pixels of one scan line: sample k lies at pixel (col + k dcol, row + k drow).
 struct Path {
     int col, row, dcol, drow, size;
@@ -64,6 +61,7 @@ inline double dot(const Tangent& a, const Tangent& b) { return a.s * b.s + a.r *
 template <class T>
 struct Line {
     const Frame<T>* frame = nullptr;
+    const FitNoise* noise = nullptr;  // of fits along the line
     Path path{};
     const T* y = nullptr;      // ordinates; `padding` more samples than the path has may be read
     const T* x = nullptr;      // null where samples are one unit apart
@@ -77,9 +75,14 @@ struct Line {
     double ordinate(int k) const { return static_cast<double>(y[k]); }
     double depth(double ordinate) const { return frame->projective ? 1 / ordinate : -ordinate; }
     std::int64_t pixel(int k) const { return path.pixel(k, frame->cols); }
-    double sigma_at(int k) const { return frame->noise.correlated_sigma(ordinate(k), pixel(k), frame->projective); }
-    double sigma_between(int i, int k) const { return (sigma_at(i) + sigma_at(k)) / 2; }
-    double sigma_of(const Segment& s) const { return sigma_between(s.left_middle(), s.right_middle()); }
+    // The noise of sample k, of the border between two samples, and of a segment.
+    SampleNoise noise_at(int k) const {
+        const double q = ordinate(k);
+        const std::int64_t p = pixel(k);
+        return {frame->noise.sigma(q, p, frame->projective), frame->noise.waves_at(q, p, frame->projective)};
+    }
+    SampleNoise noise_between(int i, int k) const { return mean(noise_at(i), noise_at(k)); }
+    SampleNoise noise_of(const Segment& s) const { return noise_between(s.left_middle(), s.right_middle()); }
     double tolerance_at(int k) const { return scale ? 1 / static_cast<double>(scale[k]) : tolerance; }
 
     // Of a curve that has this value and slope, by the abscissa, at an abscissa.

@@ -24,8 +24,8 @@ void Merger<T, List>::merge() {
         for (const int i : chosen_) {
             const int right = next(i);
             segment(i).last = segment(right).last;
-            sigma(i) = sigma(right);
-            set_sums(i, list_.sums(i) + list_.sums(right), sigma_of(i));
+            list_.sigma[i] = list_.sigma[right], list_.waves[i] = list_.waves[right];
+            set_sums(i, list_.sums(i) + list_.sums(right));
             remove(right);
         }
         cuts_.clear();
@@ -81,7 +81,7 @@ void Merger<T, List>::remove_bridges(Array<Curve>& curves) {
 template <class T, class List>
 typename Merger<T, List>::Sides Merger<T, List>::sides_without(int i, const Array<Curve>& curves) {
     const int before = previous(i), after = next(i);
-    if (before == end_ || after == end_ || !(sigma(before) > 0 && sigma(i) > 0)) return {};  // not adjacent
+    if (before == end_ || after == end_ || !(list_.sigma[before] > 0 && list_.sigma[i] > 0)) return {};  // not adjacent
     const Segment s = segment(i);
     const Line<T>& line = line_of(i);
     const double begin = line.abscissa(s.first - 1), end = line.abscissa(s.last + 1);
@@ -95,9 +95,10 @@ typename Merger<T, List>::Sides Merger<T, List>::sides_without(int i, const Arra
     sides.left = list_.sums(before), sides.right = list_.sums(after);
     if (sides.cut >= s.first) sides.left = sides.left + List::sums_over(line, {s.first, sides.cut});
     if (sides.cut < s.last) sides.right = List::sums_over(line, {sides.cut + 1, s.last}) + sides.right;
-    const double deviation = sigma_of(i), least = SegmentList::least_of(deviation);
-    const double rise = residual_squares(sides.left, least) + residual_squares(sides.right, least) -
-                        (residual(before) + residual(i) + residual(after));
+    const double deviation = list_.noise().join[s.size()] * line.noise_of(s).of_fit(s.size());
+    const double joint = residual_squares(sides.left, least_of(i, sides.left)) +
+                         residual_squares(sides.right, least_of(i, sides.right));
+    const double rise = joint - (residual(before) + residual(i) + residual(after));
     const double cost = rise / (deviation * deviation);
     if (cost < bridge_factor * bridge_factor * limit_) sides.cost = cost;
     return sides;
@@ -114,20 +115,26 @@ template <class T, class List>
 void Merger<T, List>::remove_bridge(int i, Array<Curve>& curves, Array<int>& changed) {
     const Sides sides = sides_without(i, curves);
     const int before = previous(i), after = next(i);
-    const double deviation = sigma_of(i);
     segment(before).last = sides.cut;
     segment(after).first = sides.cut + 1;
-    set_sums(before, sides.left, deviation);
-    set_sums(after, sides.right, deviation);
+    set_sums(before, sides.left);
+    set_sums(after, sides.right);
     remove(i);
     for (const int k : {before, after}) curves[k] = list_.curve(k);
     for (const int k : {previous(before), before, after, next(after)})
         if (k != end_) changed.push_back(k);
 }
 
+// The significance of a quadratic term of these sums, where the noise is that of a segment.
 template <class T, class List>
-void Merger<T, List>::set_sums(int i, const Sums& sums, double sigma) {
-    list_.least[i] = SegmentList::least_of(sigma);
+double Merger<T, List>::least_of(int i, const Sums& sums) {
+    const Line<T>& line = line_of(i);
+    return least_quadratic(line.noise_of(segment(i)), static_cast<int>(sums.n), line.noise->slope);
+}
+
+template <class T, class List>
+void Merger<T, List>::set_sums(int i, const Sums& sums) {
+    list_.least[i] = least_of(i, sums);
     list_.set_sums(i, sums);
     residual(i) = residual_squares(sums, list_.least[i]);
 }

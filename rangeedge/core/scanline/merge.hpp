@@ -45,11 +45,9 @@ private:
     int& next(int i) { return list_.links[i].next; }
     bool& chosen(int i) { return list_.links[i].chosen; }
     Segment& segment(int i) { return list_.links[i].segment; }
-    double& sigma(int i) { return list_.sigma[i]; }
     double& residual(int i) { return list_.residual[i]; }
     double& cost(int i) { return list_.cost[i]; }
     const Line<T>& line_of(int i) { return lines_[static_cast<std::size_t>(list_.links[i].line)]; }
-    double sigma_of(int i) { return line_of(i).sigma_of(segment(i)); }
 
     void choose();
     void remove(int i);
@@ -63,7 +61,8 @@ private:
     Sides sides_without(int i, const Array<Curve>& curves);
     bool cheapest_bridge(int i);
     void remove_bridge(int i, Array<Curve>& curves, Array<int>& changed);
-    void set_sums(int i, const Sums& sums, double sigma);
+    double least_of(int i, const Sums& sums);
+    void set_sums(int i, const Sums& sums);
 
     const std::vector<Line<T>>& lines_;
     double limit_;  // variances
