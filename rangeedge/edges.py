@@ -66,8 +66,8 @@ class ScanLineParams:
         Widest gap of invalid pixels on a scan line whose two sides are compared: occlusion shadows.
     maxSmear : int
         Most pixels of a scan line over which a step may be smeared, as interpolation and the footprint of a pixel do,
-        to be one jump between the surfaces on either side. More than two are a surface of their own unless it is
-        almost parallel to the viewing direction. 0 takes every pixel for a surface.
+        to be one jump between the surfaces on either side. They are a surface of their own unless that is steep, or if
+        more than two almost parallel to the viewing direction. 0 takes every pixel for a surface.
     shadowEdges : bool
         Whether a surface that ends at a gap wider than `maxGap`, in front of another one beyond it, has a jump at its
         end: the outline of an object beside its shadow. A surface with a hole in it has none.
