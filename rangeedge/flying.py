@@ -38,8 +38,9 @@ def flyingPixels(
 
         0.15 < (z - z1) / (z2 - z1) < 0.85,  z1 to z2 being a jump that exceeds the noise.
 
-    Ramps have up to `maxSmear` pixels. Of more than two they count only if they meet the viewing ray at less than 20
-    degrees, as no surface would be seen; without `K`, `pixelSize` or points there are no such angles, and all count.
+    Ramps have up to `maxSmear` pixels, and steps between these that are not too uneven. They count only if they meet
+    the viewing ray at less than 20 degrees, at which a surface would hardly be seen, or at less than 45 degrees where
+    they have no more than two pixels; without `K`, `pixelSize` or points there are no such angles, and all count.
     `edgeStrength` has no creases on these pixels, and one jump of the full height across them.
 
     Parameters

@@ -43,8 +43,10 @@ REACH, CAPPED, LONE_SHARE = 4.0, 8.0, 1 / 3  # pixels; standard deviations
 LEAST_SLOPE = 0.3
 LEAST_SPREAD, LEAST_DIRECTIONS = 0.05, (0.02, 1e-9)
 LEAST_OUTLINED = 3  # samples of a surface beside a wide gap
-SMEAR_ENDS, ALWAYS_SMEARED, VEIL = 4, 2, 20.0  # samples, samples, degrees
+SMEAR_ENDS = 4  # samples
+VEIL, VEIL_OF_TWO = 20.0, 45.0  # degrees
 OVERSHOOT, OWN_SHARE, LEAST_RAMP = 0.2, 0.15, 0.5  # of a smeared step
+MOST_EVEN = 2.01  # times the steps of an even ramp
 SMALLEST = 1e-30
 
 TIE = 1e-5  # relative: closer comparisons count as decided by rounding
@@ -466,9 +468,12 @@ class Detector:
         gaps = [b.first - a.last - 1 for a, b in pairwise(segments[i : long[1] + 1])]
         if len(samples) > self.p.maxSmear + SMEAR_ENDS:
             return None
-        x = _doubles(line.x, samples)
-        before, after = ([s.curve.value(t) for t in x] for s in (left, right))
-        if line.projective and min(before + after) <= 0:
+        ends = float(line.x[left.last]), float(line.x[right.first])
+        before, after = (  # the tangents at the ends of the sides
+            s.curve.value(end) + s.curve.slope(end) * (_doubles(line.x, samples) - end)
+            for s, end in zip((left, right), ends, strict=True)
+        )
+        if line.projective and min(*before, *after) <= 0:
             return None
         steps = np.subtract(after, before)
         if not (np.all(steps > 0) or np.all(steps < 0)):
@@ -486,9 +491,10 @@ class Detector:
         a = max([left.last] + [k for k in samples if not rising or k < rising[0]])
         b = min([right.first] + [k for k in samples if not falling or k > falling[-1]])
         smeared = [k for k in range(a + 1, b) if not math.isnan(line.y[k])]
-        if len(smeared) > self.p.maxSmear:
+        steepest = max(np.diff([0.0, *share, 1.0]))
+        if len(smeared) > self.p.maxSmear or steepest > MOST_EVEN / (len(smeared) + 1):
             return None
-        if self.image.spaced and len(smeared) > ALWAYS_SMEARED and line.grazing_angle(a, b) > VEIL:
+        if self.image.spaced and line.grazing_angle(a, b) > (VEIL if len(smeared) > 2 else VEIL_OF_TWO):
             return None
         middle = (float(line.x[a]) + float(line.x[b])) / 2
         if max(gaps) > self.p.maxGap:
@@ -655,7 +661,8 @@ class Detector:
         error = JUMP_TOLERANCES * max(line.tolerance[before], line.tolerance[after])
         if jump > 0 and abs(yf - yg) > error and jump_significance > JUMP_ALONE:
             least = abs(yf - yg) / (2.5 * (right.first - left.last) - 1.5)
-            if _smooth(line.y[max(before - 2, 0) : after + 3], least):
+            around = line.y[max(before - 2, 0) : after + 3]
+            if _smooth(around, least if len(around) == after - before + 5 else least / 2):
                 jump = 0.0
             else:
                 kind |= EDGE_JUMP | (EDGE_OCCLUDING if yf > yg else EDGE_OCCLUDED)
@@ -687,9 +694,8 @@ def _deviations(f, g, x):
 
 
 def _smooth(y, least):
-    """Whether samples have third differences, which all are smaller than that."""
-    thirds = np.abs(np.diff(y.astype(np.float64), 3))
-    return bool(np.isfinite(y).all()) and len(thirds) > 0 and thirds.max() < least
+    """Whether samples have third differences, and all of them are smaller."""
+    return len(y) > 3 and bool(np.isfinite(y).all()) and np.abs(np.diff(y.astype(np.float64), 3)).max() < least
 
 
 def _in_smear(c, smeared):

@@ -115,8 +115,8 @@ private:
         const double x = edge.abscissa;
         const EdgeSide f1 = options_.endpoint ? from_endpoint(line, f, edge.before, x) : at_midpoint(line, f, x);
         const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_midpoint(line, g, x);
-        const double most = largest_jump(line, f, g, edge.before, edge.after);
-        double jump = edge.intersects ? 0 : std::min(jump_strength(line, f1, f2), most);
+        double jump = edge.intersects ? 0 : jump_strength(line, f1, f2);
+        if (jump > 0) jump = std::min(jump, largest_jump(line, f, g, edge.before, edge.after));
         double crease = crease_strength(f1, f2);
 
         const int n1 = a.segments[i].size(), n2 = a.segments[j].size();

@@ -8,15 +8,24 @@ namespace rangeedge {
 namespace {
 
 constexpr int ends = 4;             // samples, so many more may belong to short segments than are smeared
-constexpr int always_smeared = 2;   // samples, too few to show a surface
+constexpr double veil_of_two = 45;  // degrees from the line of sight, where two samples or one hardly show a surface
 constexpr double overshoot = 0.2;   // share of the step by which a smeared depth may lie beyond a side
 constexpr double own_share = 0.15;  // share of the step up to which a sample belongs to a side
+constexpr double most_even = 2.01;  // times the steps of an even ramp, that one from sample to sample may have
 constexpr double least_ramp = 0.5;  // share of an even ramp that the samples must climb
 
-// Where the depth of a sample lies, from 0 at that to which the curve f extends to 1 at that of g; NaN where they cross
-// on the way from the sample before, or where the sample is too far off.
+// The tangent of a curve where its segment ends: farther on, the curve itself is too uncertain.
+struct EndTangent {
+    double x, y, slope;
+
+    EndTangent(const Curve& curve, double at) : x(at), y(curve.value(at)), slope(curve.slope(at)) {}
+    double value(double at) const { return y + slope * (at - x); }
+};
+
+// Where the depth of a sample lies, from 0 at that to which one side extends to 1 at that of the other; NaN where they
+// cross on the way from the sample before, or where the sample is too far off.
 template <class T>
-double share_of_step(const Line<T>& line, const Curve& f, const Curve& g, int k, double& side) {
+double share_of_step(const Line<T>& line, const EndTangent& f, const EndTangent& g, int k, double& side) {
     const double x = line.abscissa(k), y1 = f.value(x), y2 = g.value(x);
     if (side * (y2 - y1) < 0 || (line.frame->projective && !(std::min(y1, y2) > 0))) return NAN;
     side = y2 - y1;
@@ -40,26 +49,30 @@ SmearedStep smeared_step(const Line<T>& line, const Approximation& a, std::ptrdi
     if (next == i + 1 || next == a.count) return none;
 
     SmearedStep step{a.segments[i].last, a.segments[next].first, next, 0};
-    const int first = a.segments[i + 1].first, last = a.segments[next - 1].last;
-    double side = 0, at_first = 0, at_last = 0;
+    const int first = a.segments[i + 1].first;
+    const EndTangent f(a.curves[i], line.abscissa(step.before)), g(a.curves[next], line.abscissa(step.after));
+    double side = 0, at_first = 0, at_last = 0, steepest = 0;
     bool started = false;  // the ramp
     int smeared = 0;
     for (std::ptrdiff_t j = i; j < next; ++j)
         step.gap = std::max(step.gap, a.segments[j + 1].first - a.segments[j].last - 1);
     for (std::ptrdiff_t j = i + 1; j < next; ++j)
         for (int k = a.segments[j].first; k <= a.segments[j].last; ++k) {
-            const double share = share_of_step(line, a.curves[i], a.curves[next], k, side);
+            const double share = share_of_step(line, f, g, k, side);
             if (!(share == share)) return none;
             if (k == first) at_first = share;
-            if (k == last) at_last = share;
+            steepest = std::max(steepest, share - (k == first ? 0 : at_last));
+            at_last = share;
             started = started || share > own_share;
             if (!started) step.before = k;
             step.after = share < 1 - own_share ? a.segments[next].first : std::min(step.after, k);
         }
     for (int k = step.before + 1; k < step.after; ++k) smeared += line.ordinate(k) == line.ordinate(k);
+    steepest = std::max(steepest, 1 - at_last);
+    if (steepest > most_even / (smeared + 1)) return none;
     if (at_last - at_first < least_ramp * (count - 1) / (count + 1) || smeared > options.max_smear) return none;
-    const bool surface = options.spaced && smeared > always_smeared && line.grazing_angle(step.before, step.after) > veil;
-    return surface ? none : step;
+    const double most = smeared > 2 ? veil : veil_of_two;
+    return options.spaced && line.grazing_angle(step.before, step.after) > most ? none : step;
 }
 
 SmearMask::SmearMask(int rows, int cols, const std::vector<std::int32_t>& found, int least) {

@@ -3,8 +3,9 @@
 // the paper's splitting makes segments that belong to no surface.
 //
 // A smeared step is a ramp of short segments between two long ones. At each of its samples the depth lies between those
-// to which the two sides extend, and it leads from the one to the other. A ramp of more than two samples is a surface by
-// itself unless it is almost parallel to the line of sight. The jump is that between the long segments.
+// to which the two sides extend, and it leads from the one to the other in steps that are not too uneven: the limb of a
+// round surface falls off ever faster. A ramp is a surface by itself unless it is steep: seen along the line of sight,
+// almost, if it has more than two samples. The jump is that between the long segments.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstddef>

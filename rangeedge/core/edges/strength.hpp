@@ -92,11 +92,12 @@ double largest_jump(const Line<T>& line, const Curve& f1, const Curve& f2, int b
 }
 
 // Whether the samples from `before` to `after` and two on either side run on too smoothly for a step of that size, which
-// curves that do not quite follow them pretend. A sharp step has third differences of twice its size, an even ramp over n
+// curves that do not quite follow them pretend; not where one of them has no data. A sharp step has third differences of twice its size, an even ramp over n
 // samples of step / 2n.
 template <class T>
 bool is_smooth(const Line<T>& line, int before, int after, int n, double step) {
     const int first = std::max(before - 2, 0), last = std::min(after + 2, line.path.size - 1);
+    const bool whole = last - first == after - before + 4;  // else half of them are to be seen
     double largest = 0;
     for (int k = first; k + 3 <= last; ++k) {
         const double slopes = line.ordinate(k + 2) - line.ordinate(k + 1);
@@ -104,7 +105,7 @@ bool is_smooth(const Line<T>& line, int before, int after, int n, double step) {
         if (!(std::abs(third) <= HUGE_VAL)) return false;  // no data
         largest = std::max(largest, std::abs(third));
     }
-    return last - first >= 3 && largest < step / (2.5 * n - 1.5);
+    return last - first >= 3 && largest < (whole ? 1 : 0.5) * step / (2.5 * n - 1.5);
 }
 
 // The angle between the normals, in degrees: that between the tangents.
