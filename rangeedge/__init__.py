@@ -41,6 +41,7 @@ from .distance import (
 )
 from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
 from .edges import EdgeStrength, edgePoints, edgeStrength, kindNames, splitScanLine
+from .flying import flyingPixels
 from .io import RangeImage, imreadRange, imwriteRange
 from .noise import estimateNoise
 from .noise_model import NoiseModel
@@ -72,6 +73,7 @@ __all__ = [  # noqa: RUF022
     "edgeStrength",
     "edgePoints",
     "kindNames",
+    "flyingPixels",
     "strengthImage",
     "overallStrength",
     "selectEdges",

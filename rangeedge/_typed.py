@@ -34,6 +34,8 @@ class ScanLineOptions(TypedDict, total=False):
     crease: int
     maxShift: float
     maxGap: int
+    maxSmear: int
+    shadowEdges: bool
     mergeSignificance: float
     minSignificance: float
 
@@ -41,7 +43,9 @@ class ScanLineOptions(TypedDict, total=False):
 class RefinementOptions(TypedDict, total=False):
     hysteresis: float
     minLength: int
+    lineSignificance: float
     dynamic: bool
+    boundaryEdges: bool
 
 
 class SeedingOptions(TypedDict, total=False):
@@ -287,6 +291,40 @@ class Accessors:
         """
         self._set("maxGap", maxGap)
 
+    def getMaxSmear(self) -> int:
+        """getMaxSmear() -> retval
+
+        Most pixels of a scan line over which a step may be smeared, as interpolation and the footprint of a pixel do,
+        to be one jump between the surfaces on either side. More than two are a surface of their own unless it is almost
+        parallel to the viewing direction. 0 takes every pixel for a surface.
+        """
+        return self._params.maxSmear
+
+    def setMaxSmear(self, maxSmear: int, /) -> None:
+        """setMaxSmear(maxSmear) -> None
+
+        Most pixels of a scan line over which a step may be smeared, as interpolation and the footprint of a pixel do,
+        to be one jump between the surfaces on either side. More than two are a surface of their own unless it is almost
+        parallel to the viewing direction. 0 takes every pixel for a surface.
+        """
+        self._set("maxSmear", maxSmear)
+
+    def getShadowEdges(self) -> bool:
+        """getShadowEdges() -> retval
+
+        Whether a surface that ends at a gap wider than `maxGap`, in front of another one beyond it, has a jump at its
+        end: the outline of an object beside its shadow. A surface with a hole in it has none.
+        """
+        return self._params.shadowEdges
+
+    def setShadowEdges(self, shadowEdges: bool, /) -> None:
+        """setShadowEdges(shadowEdges) -> None
+
+        Whether a surface that ends at a gap wider than `maxGap`, in front of another one beyond it, has a jump at its
+        end: the outline of an object beside its shadow. A surface with a hole in it has none.
+        """
+        self._set("shadowEdges", shadowEdges)
+
     def getMergeSignificance(self) -> float:
         """getMergeSignificance() -> retval
 
@@ -379,6 +417,22 @@ class Accessors:
         """
         self._set("minLength", minLength)
 
+    def getLineSignificance(self) -> float:
+        """getLineSignificance() -> retval
+
+        Significance that a connected line must reach somewhere, as `minSignificance` is what each of its pixels must
+        have; 0 keeps all lines.
+        """
+        return self._selection.lineSignificance
+
+    def setLineSignificance(self, lineSignificance: float, /) -> None:
+        """setLineSignificance(lineSignificance) -> None
+
+        Significance that a connected line must reach somewhere, as `minSignificance` is what each of its pixels must
+        have; 0 keeps all lines.
+        """
+        self._set("lineSignificance", lineSignificance)
+
     def getDynamic(self) -> bool:
         """getDynamic() -> retval
 
@@ -394,3 +448,19 @@ class Accessors:
         Rosin).
         """
         self._set("dynamic", dynamic)
+
+    def getBoundaryEdges(self) -> bool:
+        """getBoundaryEdges() -> retval
+
+        Whether every border with pixels without data is an edge. Outlines beside shadow are edges without it, where
+        another surface is seen beyond; see `shadowEdges`.
+        """
+        return self._selection.boundaryEdges
+
+    def setBoundaryEdges(self, boundaryEdges: bool, /) -> None:
+        """setBoundaryEdges(boundaryEdges) -> None
+
+        Whether every border with pixels without data is an edge. Outlines beside shadow are edges without it, where
+        another surface is seen beyond; see `shadowEdges`.
+        """
+        self._set("boundaryEdges", boundaryEdges)

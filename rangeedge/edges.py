@@ -270,19 +270,19 @@ def edgePoints(
 def measure_strength(frame: Frame, params: ScanLineParams) -> EdgeStrength:
     """Edge strengths of a checked range image."""
     strength = _no_strength(frame.shape)
-    _core.edge_strength(frame.kernel, _kernel_options(params), frame.threads, *strength)
+    _core.edge_strength(frame.kernel, kernel_options(frame, params), frame.threads, *strength)
     return strength
 
 
 def measure_points(frame: Frame, params: ScanLineParams) -> np.ndarray:
     """Edge points of a checked range image."""
-    return _points(_core.edge_candidates(frame.kernel, _kernel_options(params), frame.threads))
+    return _points(_core.edge_candidates(frame.kernel, kernel_options(frame, params), frame.threads))
 
 
 def measure_both(frame: Frame, params: ScanLineParams) -> tuple[EdgeStrength, np.ndarray]:
     """Edge strengths and edge points of a checked range image, of one approximation of its scan lines."""
     strength = _no_strength(frame.shape)
-    found = _core.edge_strength_and_candidates(frame.kernel, _kernel_options(params), frame.threads, *strength)
+    found = _core.edge_strength_and_candidates(frame.kernel, kernel_options(frame, params), frame.threads, *strength)
     return strength, _points(found)
 
 
@@ -301,9 +301,10 @@ def _no_strength(shape: tuple[int, int]) -> EdgeStrength:
     return EdgeStrength(floats[0], floats[1], maps[12 * size :].reshape(shape), floats[2])
 
 
-def _kernel_options(params: ScanLineParams) -> _core.ScanLineOptions:
+def kernel_options(frame: Frame, params: ScanLineParams) -> _core.ScanLineOptions:
     """The options of scan lines under their names in the kernel, a choice of two as a bool, 0 for None."""
-    return _core.ScanLineOptions(**{kernel: read(getattr(params, name) or 0) for name, kernel, read in _KERNEL})
+    chosen = {kernel: read(getattr(params, name) or 0) for name, kernel, read in _KERNEL}
+    return _core.ScanLineOptions(**chosen, spaced=frame.spaced)
 
 
 def _in_kernel(option: Option) -> tuple[str, str, Callable[[Any], Any]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _core
 from ._check import array, described, error, fail, image8
-from .noise_model import NoiseModel
+from .noise_model import WHITE, NoiseModel
 from .options import ScanLineParams
 
 _THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
@@ -24,7 +24,9 @@ class Frame:
 
     `samples` holds inverse depth (`projective`) or height of shape (H, W), or points of shape (H, W, 3).
     `to_plane` takes (column, row, 1) to normalised image coordinates or to lengths; `axis` is the viewing direction;
-    `heightMap` says that heights grow toward the viewer in the image, too. `noise` is a model or a map of deviations.
+    `heightMap` says that heights grow toward the viewer in the image, too; `spaced` that the spacing of pixels is known
+    in the unit of the values. `step` is the length to whose multiples the values were rounded, 0 if none is known.
+    `noise` is a model or a map of deviations.
     """
 
     samples: np.ndarray
@@ -32,6 +34,8 @@ class Frame:
     to_plane: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0)
     axis: tuple[float, ...] = (0.0, 0.0, 1.0)
     heightMap: bool = False
+    spaced: bool = True
+    step: float = 0.0
     noise: NoiseModel | np.ndarray | None = None
 
     @property
@@ -112,9 +116,9 @@ class Frame:
     def kernel(self) -> _core.Frame:
         """The image with its noise as every kernel takes it."""
         if isinstance(self.noise, np.ndarray):
-            noise = _core.Noise(0.0, 0.0, 0.0, 1.0, self.noise)
+            noise = _core.Noise(0.0, 0.0, 0.0, WHITE, self.noise)
         else:
-            noise = _core.Noise(self.noise.a, self.noise.b, self.noise.c, self.noise.correlation)
+            noise = _core.Noise(self.noise.a, self.noise.b, self.noise.c, self.noise.of_fits())
         return _core.Frame(self.samples, self.projective, self.to_plane, self.axis, noise)
 
 
@@ -134,7 +138,7 @@ def read_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None 
         return _points(src, inside, heightMap)
     if K is not None:
         return _pinhole(src, params.depthFactor, inside, K)
-    return _grid(src, params.depthFactor, inside, pixelSize or (1.0, 1.0), heightMap)
+    return _grid(src, params.depthFactor, inside, pixelSize, heightMap)
 
 
 def _lengths(src: np.ndarray, depthFactor: float, heightMap: bool = False) -> np.ndarray:
@@ -152,19 +156,24 @@ def _lengths(src: np.ndarray, depthFactor: float, heightMap: bool = False) -> np
     return lengths
 
 
+def _step(src: np.ndarray, depthFactor: float) -> float:
+    """The length of one unit of integers."""
+    return 1 / depthFactor if src.dtype.kind in "iu" else 0.0
+
+
 def _pinhole(src: np.ndarray, depthFactor: float, inside: np.ndarray | None, K: np.ndarray) -> Frame:
     # The kernel divides by the factor what depth cameras give; other integers are divided here.
     depth = np.ascontiguousarray(src) if src.dtype == np.uint16 else _lengths(src, depthFactor)
     inverse = np.empty(depth.shape, np.float32 if depth.dtype == np.uint16 else depth.dtype)
     _core.invert_depth(depth, depthFactor, None if inside is None else inside.view(np.uint8), inverse)
-    return Frame(inverse, True, tuple(np.linalg.inv(K)[:2].ravel().tolist()))
+    return Frame(inverse, True, tuple(np.linalg.inv(K)[:2].ravel().tolist()), step=_step(src, depthFactor))
 
 
 def _grid(
     src: np.ndarray,
     depthFactor: float,
     inside: np.ndarray | None,
-    spacing: tuple[float, float],
+    pixelSize: tuple[float, float] | None,
     heightMap: bool,
 ) -> Frame:
     values = _lengths(src, depthFactor, heightMap)
@@ -175,7 +184,9 @@ def _grid(
     if inside is not None:
         height = height.copy() if np.shares_memory(height, src) else height
         height[~inside] = np.nan
-    return Frame(height, False, (spacing[0], 0.0, 0.0, 0.0, spacing[1], 0.0), heightMap=heightMap)
+    dx, dy = pixelSize or (1.0, 1.0)
+    frame = Frame(height, False, (dx, 0.0, 0.0, 0.0, dy, 0.0), heightMap=heightMap, spaced=pixelSize is not None)
+    return replace(frame, step=_step(src, depthFactor))
 
 
 def _points(src: np.ndarray, inside: np.ndarray | None, heightMap: bool) -> Frame:

@@ -9,16 +9,13 @@ import numpy as np
 from . import _core
 from ._option import parsed, takes
 from .frame import Frame, read_frame
-from .noise_model import NoiseModel
+from .noise_model import NoiseModel, correlation_of
 from .options import GEOMETRY, ScanLineParams
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from ._typed import GeometryOptions
-
-_CORRELATION_MAX = 2.5  # beyond it, curvature rather than noise
-_FINEST = 3e-5  # of the distance, or of the range of heights: no range sensor resolves more
 
 
 @takes(GEOMETRY)
@@ -29,8 +26,11 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
 
     Third differences along rows and columns vanish on every quadratic; on noise they have sqrt(20) times its
     deviation. Edges are few among them: sigma is the root mean square of the smaller three quarters, corrected for the
-    trimming. Per bin of depth, a + c z^2 with a, c >= 0 is fitted to it. The correlation is the ratio of the same
-    estimate at a lag of 6 pixels to that between neighbours, between 1 and 2.5.
+    trimming. Per bin of depth, a + c z^2 with a, c >= 0 is fitted to it. Areas of constant values do not count.
+
+    How much fits to n = 4, 8, 16, 32 pixels are off, on one scan line and on neighbouring ones together, is measured
+    likewise: by differences of the values and slopes of adjacent fits that vanish on every quadratic. Whoever detects
+    edges with the model counts with that; its `correlation` sums it up.
 
     Parameters
     ----------
@@ -44,7 +44,8 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
     -------
     retval : NoiseModel
         In the unit of the image. Never below 3e-5 of the distance (of the range of heights on a grid), so that
-        the rounding of noise-free images counts as noise; that is also what is left where no window is valid.
+        the rounding of noise-free images counts as noise, nor below that of rounding to whole units of integers or
+        to another step the values show, step / sqrt(12); that is also what is left where no window is valid.
 
     Raises
     ------
@@ -73,26 +74,6 @@ def measured_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | N
 
 def estimated(frame: Frame) -> NoiseModel:
     """The noise of a checked range image."""
-    near, far, lowest, highest, ordinates, sigmas = _core.noise_statistics(frame.ordinate, frame.threads)
-    correlation = float(np.clip(far / near, 1, _CORRELATION_MAX)) if near > 0 else 1.0
-    if not frame.projective:
-        extent = highest - lowest if highest > lowest else 1.0
-        return NoiseModel(a=max(near, _FINEST * extent), correlation=correlation)
-    if len(ordinates) == 0:
-        return NoiseModel(b=_FINEST)
-    z = 1 / ordinates
-    a, c = _fitted(z, np.maximum(sigmas * z * z, _FINEST * z))
-    if a + c / highest**2 < _FINEST / highest:
-        return NoiseModel(b=_FINEST, correlation=correlation)
-    return NoiseModel(a=a, c=c, correlation=correlation)
-
-
-def _fitted(z: np.ndarray, sigma: np.ndarray) -> tuple[float, float]:
-    """a, c >= 0 of sigma = a + c z^2, by least squares of relative errors: quiet depths count, not those of edges."""
-    columns = np.stack([np.ones_like(z), z * z], axis=1) / sigma[:, None]
-    both = np.linalg.lstsq(columns, np.ones_like(z), rcond=None)[0]
-    if (both >= 0).all():
-        return float(both[0]), float(both[1])
-    single = columns.sum(axis=0) / np.square(columns).sum(axis=0)
-    residuals = np.square(columns * single - 1).sum(axis=0)
-    return (float(single[0]), 0.0) if residuals[0] < residuals[1] else (0.0, float(single[1]))
+    numbers = _core.estimate_noise(frame.ordinate, frame.projective, frame.step, frame.threads)
+    (a, b, c, _), fits = numbers[:4], tuple(numbers[4:])
+    return NoiseModel(a, b, c, max(1.0, correlation_of(fits)), fits=fits)

@@ -1,20 +1,36 @@
-"""How noisy a range image is, as a function of depth: a model by sensor."""
+"""How noisy a range image is, as a function of depth and of how many pixels are looked at: a model by sensor."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from ._check import error, named, number, public
+
+_LEVELS = (4, 8, 16, 32, 64)  # numbers of samples of a fit for which its noise is given
+_NEIGHBOURS = 5  # scan lines that are looked at together
+_DIRECTION = 4 * len(_LEVELS) + 1  # numbers for rows, and for columns
+_RESIDUAL = 1.25  # what residuals count more, as curves through three samples are off themselves
+_LARGEST_RESIDUAL = 12.0
+
+# The noise of fits as the kernels take it (core/image/noise.hpp): the coefficients of the waves, and for rows and
+# columns each, at five numbers of samples, the factors on the deviations of slopes and values of one line, and of
+# several lines together, and the deviation of residuals.
+WHITE = (0.0,) * 4 + (1.0,) * (2 * _DIRECTION)
 
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Standard deviation of a measured length as a function of depth.
+    """Standard deviation of a measured length as a function of depth, and how it carries over to fits.
 
-    NoiseModel([a[, b[, c[, correlation]]]])
+    NoiseModel([a[, b[, c[, correlation[, length[, fits]]]]]])
 
-    sigma(z) = a + b z + c z^2, all in the unit of the range image. Calling the model evaluates it.
+    sigma(z) = a + b z + c z^2, all in the unit of the range image, is the deviation that neighbours show. Calling the
+    model evaluates it. Where neighbours err together, fits to many pixels are off by more than that tells:
+    `correlation` and `length` describe it roughly, `fits` as `estimateNoise` measures it.
 
     Parameters
     ----------
@@ -22,13 +38,20 @@ class NoiseModel:
         Coefficients, such that sigma is nowhere negative in the range measured. A triangulating sensor has only `c`
         (its noise is constant in inverse depth), a time-of-flight sensor mainly `a`.
     correlation : float
-        How much larger the deviation is over several pixels than between neighbours; 1 for white noise, about 2 for
-        a Kinect, whose matching windows make neighbours err together. Fits count with `correlation` times sigma.
+        How much larger the deviation is over many pixels than between neighbours; 1 for white noise, about 2 for
+        a Kinect, whose matching windows make neighbours err together.
+    length : float
+        Over how many pixels errors go together: where their correlation has fallen to 1/e. 0: whatever the number of
+        pixels, deviations count `correlation` times.
+    fits : tuple of float, optional
+        The noise of fits by their number of samples, along rows and columns. With it `correlation` and `length` do
+        not count.
 
     Raises
     ------
     rangeedge.error
-        If a coefficient is not finite, all are zero, or `correlation` is below 1.
+        If a coefficient is not finite, all are zero, `correlation` is below 1, `length` below 0, or `fits` is not what
+        `estimateNoise` gives.
 
     Examples
     --------
@@ -36,33 +59,48 @@ class NoiseModel:
     >>> NoiseModel(c=0.0014)(2.0)
     0.0056
     >>> NoiseModel.kinect1()
-    NoiseModel(c=0.001425, correlation=2)
+    NoiseModel(c=0.0009, correlation=1.9, length=8)
     """
 
     a: float = 0.0
     b: float = 0.0
     c: float = 0.0
     correlation: float = 1.0
+    length: float = 0.0
+    fits: tuple[float, ...] | None = None
 
     @named("NoiseModel")
     def __post_init__(self) -> None:
         for name in ("a", "b", "c"):
             number(name, getattr(self, name))
         number("correlation", self.correlation, 1)
+        number("length", self.length, 0)
         if self.a == self.b == self.c == 0:
             raise error("one of `a`, `b`, `c` must differ from 0")
+        if self.fits is None:
+            return
+        object.__setattr__(self, "fits", tuple(number("fits", value, 0) for value in self.fits))
+        if len(self.fits) != len(WHITE) or min(self.fits[4:]) == 0 or not any(self.fits[:4]):
+            raise error(f"`fits` must be the {len(WHITE)} numbers of a model of `estimateNoise`, got {len(self.fits)}")
 
     def __repr__(self) -> str:
-        told = {name: value for name, value in vars(self).items() if value != (name == "correlation")}
+        defaults = vars(NoiseModel(1.0)) | {"a": 0.0}
+        told = {name: value for name, value in vars(self).items() if name != "fits" and value != defaults[name]}
         return f"NoiseModel({', '.join(f'{name}={value:.4g}' for name, value in told.items())})"
 
     def __call__(self, z: Any) -> Any:
         return self.a + (self.b + self.c * z) * z
 
+    def of_fits(self) -> tuple[float, ...]:
+        """The noise of fits as the kernels take it."""
+        if self.fits is not None:
+            return self.fits
+        return (self.a, self.b, self.c, 0.0, *(_direction(self.correlation, self.length) * 2))
+
     @classmethod
     def kinect1(cls) -> NoiseModel:
-        """Kinect v1 and Xtion, metres: 1.425e-3 z^2 (Khoshelham and Oude Elberink 2012)."""
-        return cls(c=1.425e-3, correlation=2.0)
+        """Kinect v1 and Xtion, metres (Khoshelham and Oude Elberink 2012; our own measurements of the waves)."""
+        return cls(c=0.9e-3, correlation=1.9, length=8.0)
 
     @classmethod
     def kinect2(cls) -> NoiseModel:
@@ -79,3 +117,42 @@ class NoiseModel:
         focalLength = number("focalLength", focalLength, 0, above=True)
         baseline = number("baseline", baseline, 0, above=True)
         return cls(c=number("subpixel", subpixel, 0, above=True) / (focalLength * baseline))
+
+
+def correlation_of(fits: tuple[float, ...]) -> float:
+    """How much larger the deviation is over many pixels than between neighbours."""
+    return (fits[4 + _DIRECTION - 1] + fits[4 + 2 * _DIRECTION - 1]) / (2 * _RESIDUAL)
+
+
+@lru_cache
+def _direction(correlation: float, length: float) -> tuple[float, ...]:
+    """The factors along either direction for waves that are correlated by exp(-d^2 / length^2)."""
+    if length == 0:
+        return (correlation,) * _DIRECTION
+    waves = correlation**2 - 1  # the variance of the waves, in that of white noise
+    lines = np.arange(_NEIGHBOURS)
+    together = float(_correlated(lines, length).mean()) * _NEIGHBOURS
+    single, shared = [], []
+    for part in (_slope_difference, _gap):
+        for n in _LEVELS:
+            weights = part(n)
+            share = waves * weights @ _correlated(np.arange(2 * n), length) @ weights / (weights @ weights)
+            single.append(float(np.sqrt(1 + share)))
+            shared.append(float(np.sqrt(1 + together * share)))
+    return (*single, *shared, min(max(1.0, _RESIDUAL * correlation), _LARGEST_RESIDUAL))
+
+
+def _correlated(places: np.ndarray, length: float) -> np.ndarray:
+    return np.exp(-(np.subtract.outer(places, places) ** 2) / length**2)
+
+
+def _slope_difference(n: int) -> np.ndarray:
+    """The weights of 2 n samples in the difference of the slopes of the lines fitted to either half."""
+    slope = (np.arange(n) - (n - 1) / 2) / (n * (n * n - 1) / 12)
+    return np.concatenate([-slope, slope])
+
+
+def _gap(n: int) -> np.ndarray:
+    """The weights of 2 n samples in the gap of these lines at the common border."""
+    slope = (np.arange(n) - (n - 1) / 2) / (n * (n * n - 1) / 12)
+    return np.concatenate([-1 / n - slope * n / 2, 1 / n - slope * n / 2])

@@ -230,8 +230,27 @@ class ScanLineParams(Options):
         unit="pixels",
         group="scan lines",
     )
+    maxSmear: int = option(
+        5,
+        _whole(0),
+        "int",
+        "Most pixels of a scan line over which a step may be smeared, as interpolation and the footprint of a pixel do, to"
+        " be one jump between the surfaces on either side. They are a surface of their own unless that is steep, or if"
+        " more than two almost parallel to the viewing direction. 0 takes every pixel for a surface.",
+        unit="pixels",
+        group="scan lines",
+    )
+    shadowEdges: bool = option(
+        True,
+        _check.boolean,
+        "bool",
+        "Whether a surface that ends at a gap wider than `maxGap`, in front of another one beyond it, has a jump at its"
+        " end: the outline of an object beside its shadow. A surface with a hole in it has none.",
+        group="scan lines",
+        kernel="shadows",
+    )
     mergeSignificance: float = option(
-        5.0,
+        3.5,
         _real(0),
         "float",
         "Cuts are taken back where that raises the sum of squared residuals by less than its square, in variances of"
@@ -240,7 +259,7 @@ class ScanLineParams(Options):
         group="scan lines",
     )
     minSignificance: float = option(
-        12.0,
+        7.0,
         _real(0),
         "float",
         "Candidates are dropped whose significance, joined with that of their neighbours, is below this; 0 keeps all.",
@@ -250,8 +269,9 @@ class ScanLineParams(Options):
     @classmethod
     def paper(cls, **options: Any) -> ScanLineParams:
         """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept."""
-        basic = {"fit": FIT_INTERP, "crease": CREASE_MAX, "maxShift": 0.0, "maxGap": 0}
-        return cls(**{**basic, "mergeSignificance": 0.0, "minSignificance": 0.0, **options})
+        basic = {"fit": FIT_INTERP, "crease": CREASE_MAX, "maxShift": 0.0, "maxGap": 0, "maxSmear": 0}
+        kept = {"shadowEdges": False, "mergeSignificance": 0.0, "minSignificance": 0.0}
+        return cls(**{**basic, **kept, **options})
 
 
 @declared
@@ -289,12 +309,26 @@ class Selection(Options):
         "Least length of a connected line, >= 1: the longer side of its bounding box.",
         unit="pixels",
     )
+    lineSignificance: float = option(
+        15.0,
+        _real(0),
+        "float",
+        "Significance that a connected line must reach somewhere, as `minSignificance` is what each of its pixels must"
+        " have; 0 keeps all lines.",
+    )
     dynamic: bool = option(
         False,
         _check.boolean,
         "bool",
         "Whether to remove lines that do not stand out of the noise, by the statistics of all of them (Venkatesh and"
         " Rosin).",
+    )
+    boundaryEdges: bool = option(
+        False,
+        _check.boolean,
+        "bool",
+        "Whether every border with pixels without data is an edge. Outlines beside shadow are edges without it, where"
+        " another surface is seen beyond; see `shadowEdges`.",
     )
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from . import _check, _core
 from ._check import public
 from ._option import takes
-from .constants import EDGE_OCCLUDING
+from .constants import EDGE_BOUNDARY, EDGE_OCCLUDING
 from .edges import EdgeStrength
 from .options import SELECTION, Selection
 
@@ -269,21 +269,26 @@ selectEdges.__signature__ = inspect.signature(_of_strength)  # type: ignore[attr
 
 
 def select_strength(strength: EdgeStrength, selection: Selection) -> np.ndarray:
-    """The edge map before thinning: jumps on their nearer side, and creases that do not stand alone."""
+    """The edge map before thinning: jumps on their nearer side, creases that do not stand alone, borders if wanted."""
     jump = cv2.copyTo(strength.jump, strength.kind & np.uint8(EDGE_OCCLUDING))
     crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold)
-    return select_maps(jump, crease, selection)
+    edges = select_maps(jump, crease, selection, strength.significance)
+    if selection.boundaryEdges:
+        edges[(strength.kind & EDGE_BOUNDARY) > 0] = 255
+    return edges
 
 
-def select_maps(jump: np.ndarray, crease: np.ndarray, selection: Selection) -> np.ndarray:
+def select_maps(
+    jump: np.ndarray, crease: np.ndarray, selection: Selection, significance: np.ndarray | None = None
+) -> np.ndarray:
     """The edge map, 0 and 255, of checked strengths."""
     thresholds, hysteresis = (selection.jumpThreshold or 0.0, selection.creaseThreshold), selection.hysteresis
     edges = _reaching(jump, crease, thresholds)
     if hysteresis < 1:
         low = (hysteresis * thresholds[0], hysteresis * thresholds[1])
         edges = _connected_to(edges, _reaching(jump, crease, low))
-    if selection.minLength > 1:
-        edges = _long_components(edges, selection.minLength)
+    if selection.minLength > 1 or (significance is not None and selection.lineSignificance > 0):
+        edges = _lines(edges, selection.minLength, significance, selection.lineSignificance)
     if selection.dynamic:
         edges &= _outstanding(jump) | _outstanding(crease)
     return edges.view(np.uint8) * np.uint8(255)
@@ -330,10 +335,12 @@ def _connected_to(strong: np.ndarray, candidates: np.ndarray) -> np.ndarray:
     return _pixels_of(candidates, labels, keep)
 
 
-def _long_components(edges: np.ndarray, minLength: int) -> np.ndarray:
-    """The 8-connected components whose bounding box has a side of at least `minLength`."""
+def _lines(
+    edges: np.ndarray, minLength: int, significance: np.ndarray | None, lineSignificance: float
+) -> np.ndarray:
+    """The 8-connected components that are long, and significant somewhere."""
     kept = np.empty(edges.shape, np.uint8)
-    _core.long_components(edges.view(np.uint8), minLength, kept)
+    _core.keep_lines(edges.view(np.uint8), minLength, significance, lineSignificance, kept)
     return kept.view(bool)
 
 

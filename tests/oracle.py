@@ -7,6 +7,7 @@ carried over from one step to the next. Only splitting is done in the precision 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Any
@@ -35,11 +36,17 @@ from rangeedge import (
 REFINEMENTS = ("merged", "dissolved")  # of least-squares approximations, in this order
 CURVED_SIGNIFICANCE = 5.0  # of the quadratic term
 STRADDLING = 2.0  # how much more, in significance, a segment across an edge may cost
+TIE_COST = 1e-6  # of a cut, a sample
 LONE_SIGNIFICANCE = 3.0
 JUMP_TOLERANCES, JUMP_ALONE = 2.0, 12.0
 REACH, CAPPED, LONE_SHARE = 4.0, 8.0, 1 / 3  # pixels; standard deviations
 LEAST_SLOPE = 0.3
 LEAST_SPREAD, LEAST_DIRECTIONS = 0.05, (0.02, 1e-9)
+LEAST_OUTLINED = 3  # samples of a surface beside a wide gap
+SMEAR_ENDS = 4  # samples
+VEIL, VEIL_OF_TWO = 20.0, 45.0  # degrees
+OVERSHOOT, OWN_SHARE, LEAST_RAMP = 0.2, 0.15, 0.5  # of a smeared step
+MOST_EVEN = 2.01  # times the steps of an even ramp
 SMALLEST = 1e-30
 
 TIE = 1e-5  # relative: closer comparisons count as decided by rounding
@@ -77,23 +84,52 @@ def _runs(y, x):
 def _split_run(y, x, eps, scale, first, last):
     if last - first + 1 <= 3:
         return [(first, last)]
-    m = (first + last) // 2
-    left, right = x[m] - x[first], x[last] - x[m]
-    slope_left, slope_right = (y[m] - y[first]) / left, (y[last] - y[m]) / right
-    a = (slope_right - slope_left) / (left + right)
-    b = slope_left + a * left
-    worst, k = -math.inf, first
+    m = midpoint(y, x, first, last)
+    left, right, inverse = x[m] - x[first], x[last] - x[m], 1 / (x[last] - x[first])
+    if m == first:
+        a, b = y.dtype.type(0), (y[last] - y[first]) * inverse
+    else:
+        slope_left, slope_right = (y[m] - y[first]) / left, (y[last] - y[m]) / right
+        a = (slope_right - slope_left) * inverse
+        b = (slope_left * right + slope_right * left) * inverse
+    residuals = []
     for i in range(first + 1, last):
         t = x[i] - x[m]
         residual = abs(y[i] - (y[m] + t * (b + a * t)))
-        if scale is not None:
-            residual = residual * scale[i]
-        if residual > worst:
-            worst, k = residual, i
+        residuals.append(residual if scale is None else residual * scale[i])
+    worst = np.nanmax(residuals)
     if not worst > eps:
         return [(first, last)]
-    cut = k if abs(y[k] - y[k - 1]) <= abs(y[k + 1] - y[k]) else k - 1  # the last sample before it
-    return _split_run(y, x, eps, scale, first, cut) + _split_run(y, x, eps, scale, cut + 1, last)
+    extreme = [first + 1 + i for i, residual in enumerate(residuals) if residual == worst]
+    outer = {extreme[0], extreme[-1]}
+    nearest = min(abs(2 * k - first - last) for k in outer)
+    cuts = {_cut_at(y, first, last, k) for k in outer if abs(2 * k - first - last) == nearest}
+    bounds = [first - 1, *sorted(cuts), last]
+    return [s for a, b in pairwise(bounds) for s in _split_run(y, x, eps, scale, a + 1, b)]
+
+
+def _cut_at(y, first, last, k):
+    """The last sample before the cut beside an extreme sample."""
+    left, right = abs(y[k] - y[k - 1]), abs(y[k + 1] - y[k])
+    return k if left < right or (left == right and k < (first + last) / 2) else k - 1
+
+
+def midpoint(y, x, first, last):
+    """The middle sample, or that of two which is closer to the straight line between the ends.
+
+    The first sample where they are equally far on either side of it: then that line is the curve.
+    """
+    (m, n), slope = middles(first, last), (y[last] - y[first]) / (x[last] - x[first])
+    left = y[m] - y[first] - slope * (x[m] - x[first])
+    right = y[n] - y[last] + slope * (x[last] - x[n])
+    if m < n and left == -right and left != 0:
+        return first
+    return n if abs(right) < abs(left) else m
+
+
+def middles(first, last):
+    """The two samples in the middle, which are one where their number is odd."""
+    return (first + last) // 2, (first + last + 1) // 2
 
 
 # Curves.
@@ -184,6 +220,26 @@ class Line:
     scale: np.ndarray | None  # inverse tolerances, where they differ
     place: Any = None  # abscissa to the position (X, Y) in the plane of the image
 
+    def sigma_in(self, s):
+        """In the middle of a segment."""
+        return self.sigma[list(middles(s.first, s.last))].mean()
+
+    def height(self, y):
+        """The depth of an ordinate, or a height."""
+        with np.errstate(divide="ignore"):
+            return np.float64(1) / y if self.projective else y
+
+    def grazing_angle(self, i, k):
+        """Between the straight line from sample i to sample k and the viewing ray to its middle, in degrees."""
+        points = []
+        for j in (i, k):
+            (X, Y), _ = self.place(float(self.x[j]))
+            y = float(self.y[j])
+            points.append(np.array([X, Y, 1]) / y if self.projective else np.array([X, Y, -y]))
+        way = points[1] - points[0]
+        ray = points[0] + points[1] if self.projective else np.array([0, 0, 1.0])
+        return math.degrees(math.atan2(float(np.linalg.norm(np.cross(way, ray))), abs(float(way @ ray))))
+
     def tangent(self, x, value, slope):
         """Derivative by the abscissa of a curve in space, the ray to its point, and how the ray moves."""
         (X, Y), (dX, dY) = self.place(x)
@@ -245,7 +301,7 @@ class Image:
 
     data: np.ndarray
     K: np.ndarray | None = None
-    spacing: tuple[float, float] = (1.0, 1.0)
+    spacing: tuple[float, float] | None = None
     projective: bool = False
     height: bool = False
     noise: NoiseModel = field(default_factory=lambda: NoiseModel(a=1.0))
@@ -258,6 +314,11 @@ class Image:
     def has_data(self, u, v):
         rows, cols = self.shape
         return 0 <= u < cols and 0 <= v < rows and bool(np.isfinite(self.data[v, u]).all())
+
+    @property
+    def spaced(self):
+        """Whether the spacing of pixels is known as a length."""
+        return self.K is not None or self.spacing is not None or self.data.ndim == 3
 
     @property
     def z_sign(self):
@@ -298,7 +359,7 @@ class Image:
         values = self.data[v, u]
         y = 1 / values if self.projective else values if self.height else -values
         x = np.arange(len(pixels)).astype(values.dtype)
-        to_plane = np.diag([*self.spacing, 1.0]) if self.K is None else np.linalg.inv(self.K)
+        to_plane = np.diag([*(self.spacing or (1.0, 1.0)), 1.0]) if self.K is None else np.linalg.inv(self.K)
         start = to_plane @ [*pixels[0], 1.0]
         dx, dy = STEPS[self._direction(pixels)]
         step = to_plane @ [dx, dy, 0.0]
@@ -351,6 +412,7 @@ class Image:
 class Detector:
     def __init__(self, image: Image):
         self.image, self.p = image, image.params
+        self.smeared = Counter()  # how often a pixel is found to be one over which a step is smeared
 
     def candidates(self):
         found = []
@@ -358,7 +420,9 @@ class Detector:
             if self.p.directions & direction:
                 for pixels in paths(direction, *self.image.shape):
                     found += self._of_line(self.image.line(pixels, direction))
-        return Neighbourhood(found, self.image).pooled()
+        least = bin(self.p.directions).count("1")
+        smeared = {p for p in self.smeared if sum(self.smeared[q] for q in _around([p])) >= least}
+        return Neighbourhood([c for c in found if not _in_smear(c, smeared)], self.image).pooled()
 
     def segments(self, line):
         eps = line.y.dtype.type(1 if line.scale is not None else np.nanmax(line.tolerance, initial=0))
@@ -369,24 +433,82 @@ class Detector:
         segments = self.segments(line)
         if self.p.fit == FIT_INTERP:
             for s in segments:
-                k = np.unique([s.first, (s.first + s.last) // 2, s.last])
-                s.curve = fitted(_doubles(line.x, k), _doubles(line.y, k), len(k) - 1)
+                k = {s.first, s.last}
+                if s.size > 2:
+                    k.add(midpoint(line.y, line.x, s.first, s.last))
+                s.curve = fitted(_doubles(line.x, sorted(k)), _doubles(line.y, sorted(k)), len(k) - 1)
         else:
             for s in segments:
                 s.curve = self._fit(line, s)
             for refinement in REFINEMENTS if self.p.mergeSignificance > 0 else ():
                 segments = getattr(self, "_" + refinement)(line, segments)
-        found = []
-        for left, right in pairwise(segments):
-            if right.first - left.last - 1 <= self.p.maxGap:
-                candidate = self._measured(line, left, right, *self._position(line, left, right))
-                if candidate.jump > 0 or candidate.crease > 0:
-                    found.append(candidate)
+        found, i = [], 0
+        while i + 1 < len(segments):
+            candidate, i = self._smeared_step(line, segments, i) or (self._at_cut(line, *segments[i : i + 2]), i + 1)
+            if candidate and (candidate.jump > 0 or candidate.crease > 0):
+                found.append(candidate)
         return found
+
+    def _at_cut(self, line, left, right):
+        gap = right.first - left.last - 1
+        if gap > self.p.maxGap:
+            long = min(left.size, right.size) >= LEAST_OUTLINED
+            return self._outline(line, left, right, left.last, right.first) if long else None
+        if gap and min(left.size, right.size) == 1:
+            return None
+        return self._measured(line, left, right, *self._position(line, left, right))
+
+    def _smeared_step(self, line, segments, i):
+        """The jump over the short segments after the i-th one, and the number of the long one after them; or None."""
+        long = [j for j in range(i, len(segments)) if segments[j].size > self.p.maxSmear][:2]
+        if len(long) < 2 or long[0] != i or long[1] == i + 1:
+            return None
+        left, short, right = segments[i], segments[i + 1 : long[1]], segments[long[1]]
+        samples = [k for s in short for k in range(s.first, s.last + 1)]
+        gaps = [b.first - a.last - 1 for a, b in pairwise(segments[i : long[1] + 1])]
+        if len(samples) > self.p.maxSmear + SMEAR_ENDS:
+            return None
+        ends = float(line.x[left.last]), float(line.x[right.first])
+        before, after = (  # the tangents at the ends of the sides
+            s.curve.value(end) + s.curve.slope(end) * (_doubles(line.x, samples) - end)
+            for s, end in zip((left, right), ends, strict=True)
+        )
+        if line.projective and min(*before, *after) <= 0:
+            return None
+        steps = np.subtract(after, before)
+        if not (np.all(steps > 0) or np.all(steps < 0)):
+            return None
+        here, before, after = (line.height(np.array(y)) for y in (_doubles(line.y, samples), before, after))
+        share = (here - before) / (after - before)
+        slack = np.maximum(OVERSHOOT, line.tolerance[samples] / abs(steps))
+        n = len(samples)
+        if np.any(share < -slack) or np.any(share > 1 + slack):
+            return None
+        if share[-1] - share[0] < LEAST_RAMP * (n - 1) / (n + 1):
+            return None
+        rising = [k for k, p in zip(samples, share, strict=True) if p > OWN_SHARE]
+        falling = [k for k, p in zip(samples, share, strict=True) if p < 1 - OWN_SHARE]
+        a = max([left.last] + [k for k in samples if not rising or k < rising[0]])
+        b = min([right.first] + [k for k in samples if not falling or k > falling[-1]])
+        smeared = [k for k in range(a + 1, b) if not math.isnan(line.y[k])]
+        steepest = max(np.diff([0.0, *share, 1.0]))
+        if len(smeared) > self.p.maxSmear or steepest > MOST_EVEN / (len(smeared) + 1):
+            return None
+        if self.image.spaced and line.grazing_angle(a, b) > (VEIL if len(smeared) > 2 else VEIL_OF_TWO):
+            return None
+        middle = (float(line.x[a]) + float(line.x[b])) / 2
+        if max(gaps) > self.p.maxGap:
+            candidate = self._outline(line, left, right, a, b)
+        else:
+            candidate = self._measured(line, left, right, a, b, middle, (a + b) / 2, False)
+        if not candidate or not candidate.kind & EDGE_JUMP:
+            return None
+        self.smeared.update(line.pixels[k] for k in smeared)
+        return candidate, long[1]
 
     def _fit(self, line, s):
         k = np.arange(s.first, s.last + 1)
-        sigma = line.sigma[s.first + s.size // 2]
+        sigma = line.sigma_in(s)
         return least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
 
     def _merged(self, line, segments):
@@ -407,36 +529,77 @@ class Detector:
         """By how much one curve for both raises the sum of squared residuals, in variances of the noise."""
         if not _adjacent(line, left, right):
             return math.inf
-        k, sigma = np.arange(left.first, right.last + 1), line.sigma[left.last]
+        k, sigma = np.arange(left.first, right.last + 1), line.sigma[[left.last, right.first]].mean()
         one = least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
-        return (one.sum_squares - left.curve.sum_squares - right.curve.sum_squares) / sigma**2
+        rise = (one.sum_squares - left.curve.sum_squares - right.curve.sum_squares) / sigma**2
+        return rise + TIE_COST * len(k)
 
     def _dissolved(self, line, segments):
+        """In every round, segments go that cost less than the others up to two away."""
         segments = list(segments)
-        i = 1
-        while i + 1 < len(segments):
-            pair = self._without(line, *segments[i - 1 : i + 2])
-            if pair is None:
-                i += 1
-            else:
-                segments[i - 1 : i + 2] = pair
-                i = max(1, i - 1)
-        return segments
+        while True:
+            parts = [self._without(line, *segments[i - 1 : i + 2]) for i in range(1, len(segments) - 1)]
+            costs = [math.inf] * 3 + [cost for cost, _ in parts] + [math.inf] * 3
+            chosen = [
+                i
+                for i in range(1, len(segments) - 1)
+                if costs[i + 2] < min(costs[i : i + 2]) and costs[i + 2] <= min(costs[i + 3 : i + 5])
+            ]
+            if not chosen:
+                return segments
+            for i in reversed(chosen):
+                segments[i - 1 : i + 2] = parts[i - 1][1]
 
     def _without(self, line, left, s, right):
-        """The outer two of three segments with the samples of the middle one, or None."""
+        """What it costs to take out the middle one of three segments, and what the outer two then are."""
+        stays = math.inf, None
         if not _adjacent(line, left, s) or not _adjacent(line, s, right):
-            return None
+            return stays
         x = meeting(left.curve, right.curve, (float(line.x[s.first]) + float(line.x[s.last])) / 2)
         if x is None or not line.x[s.first - 1] <= x <= line.x[s.last + 1]:
-            return None
+            return stays
         cut = max([s.first - 1] + [k for k in range(s.first, s.last + 1) if line.x[k] <= x])
-        pair, sigma = [Segment(left.first, cut), Segment(cut + 1, right.last)], line.sigma[s.first + s.size // 2]
+        pair, sigma = [Segment(left.first, cut), Segment(cut + 1, right.last)], line.sigma_in(s)
         for part in pair:
             k = np.arange(part.first, part.last + 1)
             part.curve = least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
         rise = sum(p.curve.sum_squares for p in pair) - sum(p.curve.sum_squares for p in (left, s, right))
-        return pair if rise < (STRADDLING * self.p.mergeSignificance * sigma) ** 2 else None
+        cost = rise / sigma**2
+        return (cost, pair) if cost < (STRADDLING * self.p.mergeSignificance) ** 2 else stays
+
+    def _outline(self, line, left, right, a, b):
+        """The jump at the end of the nearer of two surfaces, beside a wide gap between samples a and b; or None."""
+        if not self.p.shadowEdges:
+            return None
+        ends = [(float(line.x[a]), left.curve), (float(line.x[b]), right.curve)]
+        (x, near), (x_far, far) = sorted(ends, key=lambda end: end[1].value(end[0]), reverse=True)
+        y, y_far, below = near.value(x), far.value(x_far), far.value(x)
+        if line.projective and not min(y, y_far, below) > 0:
+            return None
+        if self.image.spaced and line.grazing_angle(a, b) > VEIL:
+            return None
+        difference = min(y - below, y - y_far)
+        if not self.image.spaced:
+            difference = min(difference, near.value(x_far) - y_far)
+        significance = difference / (line.sigma[[a, b]].mean() * math.hypot(*_deviations(near, far, x)))
+        if not (significance > JUMP_ALONE and difference > JUMP_TOLERANCES * max(line.tolerance[[a, b]])):
+            return None
+        first = near is left.curve
+        sample, (u, v), (dx, dy) = a + 0.5 if first else b - 0.5, line.pixels[0], STEPS[line.direction]
+        return Candidate(
+            x=u + sample * dx,
+            y=v + sample * dy,
+            shift=0.0,
+            jump=min(abs(line.height(y) - line.height(other)) for other in (below, y_far)),
+            crease=0.0,
+            significance=significance,
+            kind=EDGE_JUMP | (EDGE_OCCLUDING if first else EDGE_OCCLUDED),
+            direction=line.direction,
+            pixels=(line.pixels[a], line.pixels[b]),
+            place=np.zeros(2),
+            along=np.zeros(2),
+            sides=[(0.0, 0.0, math.inf)] * 2,
+        )
 
     def _position(self, line, left, right):
         """Pixels before and after the edge, its abscissa, its place in samples, and whether the curves meet there."""
@@ -475,8 +638,13 @@ class Detector:
             xf = xg = x
             yf, yg = zf, zg = left.curve.value(x), right.curve.value(x)
             mf, mg = left.curve.slope(x), right.curve.slope(x)
-        height = (lambda y: 1 / y) if line.projective else (lambda y: y)
+        height = line.height
         jump = 0.0 if meets else abs(height(yf) - height(yg))
+        ends = float(line.x[before]), float(line.x[after])
+        ahead = min((ends[1] - ends[0]) / (after - before), (ends[1] - ends[0]) / 2)
+        inside = height(left.curve.value(ends[0] - ahead)), height(right.curve.value(ends[1] + ahead))
+        ends = height(left.curve.value(ends[0])), height(right.curve.value(ends[1]))
+        jump = min(jump, abs(ends[0] - ends[1]) + abs(ends[0] - inside[0]) + abs(ends[1] - inside[1]))
         bend = line.crease(xf, (zf, mf), xg, (zg, mg))
         sigma = (line.sigma[before] + line.sigma[after]) / 2
         jump_deviation = sigma * math.sqrt(left.curve.value_variance(xf) + right.curve.value_variance(xg))
@@ -492,7 +660,13 @@ class Detector:
         kind = 0
         error = JUMP_TOLERANCES * max(line.tolerance[before], line.tolerance[after])
         if jump > 0 and abs(yf - yg) > error and jump_significance > JUMP_ALONE:
-            kind |= EDGE_JUMP | (EDGE_OCCLUDING if yf > yg else EDGE_OCCLUDED)
+            least = abs(yf - yg) / (2.5 * (right.first - left.last) - 1.5)
+            around = line.y[max(before - 2, 0) : after + 3]
+            if _smooth(around, least if len(around) == after - before + 5 else least / 2):
+                jump = 0.0
+            else:
+                kind |= EDGE_JUMP | (EDGE_OCCLUDING if yf > yg else EDGE_OCCLUDED)
+                crease = 0.0
         if crease > 0:
             kind |= EDGE_CONVEX if bend > 0 else EDGE_CONCAVE
         (u, v), (dx, dy) = line.pixels[0], STEPS[line.direction]
@@ -513,6 +687,26 @@ class Detector:
             along=along / unit,
             sides=[(value, slope / unit, variance / unit**2) for value, slope, variance in sides],
         )
+
+
+def _deviations(f, g, x):
+    return math.sqrt(f.value_variance(x)), math.sqrt(g.value_variance(x))
+
+
+def _smooth(y, least):
+    """Whether samples have third differences, and all of them are smaller."""
+    return len(y) > 3 and bool(np.isfinite(y).all()) and np.abs(np.diff(y.astype(np.float64), 3)).max() < least
+
+
+def _in_smear(c, smeared):
+    """A jump whose nearer side is smeared, or a crease of which a pixel is smeared or beside one that is."""
+    if c.kind & EDGE_JUMP:
+        return c.pixels[0 if c.kind & EDGE_OCCLUDING else 1] in smeared
+    return not _around(c.pixels).isdisjoint(smeared)
+
+
+def _around(pixels):
+    return {(u + i, v + j) for u, v in pixels for i in (-1, 0, 1) for j in (-1, 0, 1)}
 
 
 def _doubles(values, k):
@@ -651,17 +845,26 @@ def edge_strength(image, candidates):
     rows, cols = image.shape
     jump, crease, significance = (np.zeros((rows, cols)) for _ in range(3))
     kind = np.zeros((rows, cols), np.uint8)
+    at_pixels = {}
     for c in candidates:
         for (u, v), occluding in zip(c.pixels, (EDGE_OCCLUDING, EDGE_OCCLUDED), strict=True):
-            if c.kind & EDGE_JUMP:
-                kind[v, u] |= EDGE_JUMP | (EDGE_OCCLUDING if c.kind & occluding else EDGE_OCCLUDED)
-            angle, largest = np.float32(c.crease), np.float32(crease[v, u])
-            if angle > largest or (angle == largest and c.kind & EDGE_CONVEX):
-                crease[v, u] = c.crease
-                kind[v, u] &= ~np.uint8(EDGE_CONVEX | EDGE_CONCAVE)
-                kind[v, u] |= c.kind & (EDGE_CONVEX | EDGE_CONCAVE)
-            jump[v, u] = max(jump[v, u], c.jump)
-            significance[v, u] = max(significance[v, u], c.significance)
+            at_pixels.setdefault((v, u), []).append((c, EDGE_OCCLUDING if c.kind & occluding else EDGE_OCCLUDED))
+    for p, there in at_pixels.items():
+        jump[p] = max(c.jump for c, _ in there)
+        jumps = [(c, side) for c, side in there if c.kind & EDGE_JUMP]
+        sure = max((c.significance for c, _ in jumps), default=0.0)
+        if not any(c.crease > 0 and c.significance > sure for c, _ in there):
+            for _, side in jumps:
+                kind[p] |= EDGE_JUMP | side
+        if kind[p] & EDGE_JUMP:
+            significance[p] = sure
+            continue
+        significance[p] = max(c.significance for c, _ in there)
+        creases = [(np.float32(c.crease), c.kind & EDGE_CONVEX, c) for c, _ in there if c.crease > 0]
+        if creases:
+            largest = max(creases, key=lambda found: found[:2])[2]
+            crease[p] = largest.crease
+            kind[p] |= largest.kind & (EDGE_CONVEX | EDGE_CONCAVE)
     kind[beside_invalid(image)] |= EDGE_BOUNDARY
     return jump, crease, kind, significance
 

@@ -21,7 +21,7 @@ from rangeedge import _core
 
 PUBLIC = """
     error RangeImage imreadRange imwriteRange NoiseModel estimateNoise ScanLineParams splitScanLine
-    EdgeStrength edgeStrength edgePoints kindNames strengthImage overallStrength selectEdges thinEdges detectEdges
+    EdgeStrength edgeStrength edgePoints kindNames flyingPixels strengthImage overallStrength selectEdges thinEdges detectEdges
     detectEdgesWithStrength
     ScanLineDetector createScanLineDetector closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels

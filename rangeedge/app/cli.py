@@ -169,7 +169,8 @@ def _add_options(parser: argparse.ArgumentParser, title: str, options: Mapping[s
 def _add_option(group: Any, option: Option) -> None:
     flag, text = _flag(option.name), _help(option)
     if option.read is bool:
-        group.add_argument(flag, action="store_true", dest=option.name, help=text)
+        action = argparse.BooleanOptionalAction if option.default else "store_true"
+        group.add_argument(flag, action=action, dest=option.name, help=text)
     elif option.choices:
         read = _reader(lambda word: _chosen(option, word))
         group.add_argument(flag, type=read, metavar="|".join(option.choices), dest=option.name, help=text)

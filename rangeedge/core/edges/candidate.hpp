@@ -26,7 +26,7 @@ struct Candidate {
     float x, y;          // position in pixels
     float shift;         // samples from the cut to the position
     float jump, crease;  // length, degrees
-    float significance;  // standard deviations, at last together with its neighbours
+    float significance;  // standard deviations as one of several neighbours has them, at last together with these
     std::uint8_t kind, direction;
     std::int32_t before, after;  // linear indices of the pixels on either side
     std::int32_t order;          // by direction, then by line, then along the line

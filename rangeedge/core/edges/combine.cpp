@@ -7,19 +7,26 @@ namespace rangeedge {
 
 void combine(const std::vector<Candidate>& candidates, float* jump, float* crease, std::uint8_t* kind,
              float* significance) {
-    constexpr int types = convex_bit | concave_bit;
-    for (const Candidate& c : candidates) {
+    constexpr int jumps = jump_bit | occluding_bit | occluded_bit, creases = convex_bit | concave_bit;
+    for (const Candidate& c : candidates)
         for (const std::int32_t p : {c.before, c.after}) {
-            const bool nearer = ((c.kind & occluding_bit) != 0) == (p == c.before);
-            if (c.kind & jump_bit)
-                kind[p] = static_cast<std::uint8_t>(kind[p] | jump_bit | (nearer ? occluding_bit : occluded_bit));
-            if (c.crease > crease[p] || (c.crease > 0 && c.crease == crease[p] && (c.kind & convex_bit)))
-                kind[p] = static_cast<std::uint8_t>((kind[p] & ~types) | (c.kind & types));
-            crease[p] = std::max(crease[p], c.crease);
             jump[p] = std::max(jump[p], c.jump);
+            if (!(c.kind & jump_bit)) continue;
+            const bool nearer = ((c.kind & occluding_bit) != 0) == (p == c.before);
+            kind[p] = static_cast<std::uint8_t>(kind[p] | jump_bit | (nearer ? occluding_bit : occluded_bit));
             significance[p] = std::max(significance[p], c.significance);
         }
-    }
+    for (const Candidate& c : candidates)
+        for (const std::int32_t p : {c.before, c.after})
+            if (c.crease > 0 && c.significance > significance[p]) kind[p] = static_cast<std::uint8_t>(kind[p] & ~jumps);
+    for (const Candidate& c : candidates)
+        for (const std::int32_t p : {c.before, c.after}) {
+            if (kind[p] & jump_bit) continue;
+            significance[p] = std::max(significance[p], c.significance);
+            if (c.crease > crease[p] || (c.crease > 0 && c.crease == crease[p] && (c.kind & convex_bit)))
+                kind[p] = static_cast<std::uint8_t>((kind[p] & ~creases) | (c.kind & creases));
+            crease[p] = std::max(crease[p], c.crease);
+        }
 }
 
 }  // namespace rangeedge

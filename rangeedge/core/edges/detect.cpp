@@ -10,6 +10,8 @@
 #include "edges/cells.hpp"
 #include "edges/neighbours.hpp"
 #include "edges/position.hpp"
+#include "edges/shadow.hpp"
+#include "edges/smear.hpp"
 #include "edges/strength.hpp"
 #include "scanline/approximation.hpp"
 #include "scanline/reader.hpp"
@@ -18,8 +20,15 @@ namespace rangeedge {
 namespace {
 
 constexpr double lone_significance = 3;   // standard deviations that a candidate needs by itself, before its neighbours
-constexpr double jump_significance = 12;  // standard deviations that a jump needs by itself
+constexpr double lone_jump = 8;             // standard deviations that a jump needs by itself
 constexpr double jump_tolerances = 2;     // tolerances of splitting that a jump exceeds, the error of approximation
+constexpr int least_outlined = 3;         // samples of a surface beside a wide gap
+
+// Candidates of some lines, and the pixels over which steps are smeared there.
+struct Found {
+    std::vector<Candidate> candidates;
+    std::vector<std::int32_t> smeared;
+};
 
 template <class T>
 class LineDetector {
@@ -29,49 +38,113 @@ public:
 
     void read(int first, int count, Strip<T>& strip) const { reader_.read(direction_, first, count, strip); }
 
-    void detect(const Strip<T>& strip, Approximator<T>& approximator, std::vector<Candidate>& candidates) const {
+    void detect(const Strip<T>& strip, Approximator<T>& approximator, Found& found) const {
         approximator.approximate(strip);  // paper, 4.1
         for (std::size_t i = 0; i < strip.lines.size(); ++i)
-            detect(strip.lines[i], approximator.line(static_cast<std::ptrdiff_t>(i)), candidates);
+            detect(strip.lines[i], approximator.line(static_cast<std::ptrdiff_t>(i)), found);
     }
 
 private:
-    void detect(const Line<T>& line, const Approximation& a, std::vector<Candidate>& candidates) const {
-        for (std::ptrdiff_t i = 0; i + 1 < a.count; ++i) {
-            if (a.segments[i + 1].first - a.segments[i].last - 1 > options_.max_gap) continue;
-            const Position edge = adapted_position(line, a, i, options_.max_shift);         // paper, 4.2, Fig. 5
-            const Candidate candidate = measure(line, a.curves[i], a.curves[i + 1], edge);  // paper, 4.2, Fig. 4
-            if (candidate.jump > 0 || candidate.crease > 0) candidates.push_back(candidate);
+    void detect(const Line<T>& line, const Approximation& a, Found& found) const {
+        for (std::ptrdiff_t i = 0; i + 1 < a.count;) {
+            Candidate candidate{};
+            std::ptrdiff_t next = measure_smeared(line, a, i, candidate, found.smeared);
+            if (next == i) candidate = measure_cut(line, a, i), next = i + 1;
+            if (candidate.jump > 0 || candidate.crease > 0) found.candidates.push_back(candidate);
+            i = next;
         }
     }
 
-    Candidate measure(const Line<T>& line, const Curve& f, const Curve& g, const Position& edge) const {
+    Candidate measure_cut(const Line<T>& line, const Approximation& a, std::ptrdiff_t i) const {
+        const Segment &left = a.segments[i], &right = a.segments[i + 1];
+        const int gap = right.first - left.last - 1, shorter = std::min(left.size(), right.size());
+        if (gap > options_.max_gap) {
+            if (shorter < least_outlined) return {};
+            return measure_outline(line, a, i, i + 1, left.last, right.first);
+        }
+        if (gap > 0 && shorter < 2) return {};  // a single sample tells nothing of what is beyond a gap
+        const Position edge = adapted_position(line, a, i, options_.max_shift);     // paper, 4.2, Fig. 5
+        return measure(line, a, i, i + 1, edge, gap + 1);                           // paper, 4.2, Fig. 4
+    }
+
+    // The jump of a smeared step after segment i; `smeared` receives its pixels. Returns the segment on its other side,
+    // or i where there is none.
+    std::ptrdiff_t measure_smeared(const Line<T>& line, const Approximation& a, std::ptrdiff_t i, Candidate& candidate,
+                                   std::vector<std::int32_t>& smeared) const {
+        const SmearedStep step = smeared_step(line, a, i, options_);
+        if (step.next == i) return i;
+        const double x = (line.abscissa(step.before) + line.abscissa(step.after)) / 2;
+        const Position edge{step.before, step.after, x, (step.before + step.after) / 2.0, 0, false};
+        const int samples = a.segments[step.next].first - a.segments[i].last;
+        candidate = step.gap > options_.max_gap ? measure_outline(line, a, i, step.next, step.before, step.after)
+                                                : measure(line, a, i, step.next, edge, samples);
+        if (!(candidate.kind & jump_bit)) return i;
+        for (int k = step.before + 1; k < step.after; ++k)
+            if (line.ordinate(k) == line.ordinate(k)) smeared.push_back(static_cast<std::int32_t>(line.pixel(k)));
+        return step.next;
+    }
+
+    // The jump at the end of the nearer of two surfaces, half a sample beyond it.
+    Candidate measure_outline(const Line<T>& line, const Approximation& a, std::ptrdiff_t i, std::ptrdiff_t j, int before,
+                              int after) const {
+        if (!options_.shadows) return {};
+        const ShadowStep step = step_across_shadow(line, a.fit(i), a.fit(j), before, after, options_.spaced);
+        if (!is_jump(line, before, after, step.difference, step.difference / step.deviation)) return {};
+        Candidate c{};
+        c.jump = within_range(step.jump);
+        c.significance = std::min(static_cast<float>(step.difference / step.shared_deviation), endless);
+        c.kind = static_cast<std::uint8_t>(jump_bit | (step.before_nearer ? occluding_bit : occluded_bit));
+        locate(c, line, {before, after, 0, step.before_nearer ? before + 0.5 : after - 0.5, 0, false});
+        return c;
+    }
+
+    // A jump exceeds the error of the approximation, and is significant without its neighbours.
+    static bool is_jump(const Line<T>& line, int before, int after, double difference, double significance) {
+        const double tolerance = std::max(line.tolerance_at(before), line.tolerance_at(after));
+        return difference > jump_tolerances * tolerance && significance > lone_jump;
+    }
+
+    static float within_range(double jump) {
+        return static_cast<float>(std::min(jump, static_cast<double>(std::numeric_limits<float>::max())));
+    }
+
+    // From segment i to segment j, it is `steps` samples.
+    Candidate measure(const Line<T>& line, const Approximation& a, std::ptrdiff_t i, std::ptrdiff_t j,
+                      const Position& edge, int steps) const {
+        const Curve &f = a.curves[i], &g = a.curves[j];
         const double x = edge.abscissa;
         const EdgeSide f1 = options_.endpoint ? from_endpoint(line, f, edge.before, x) : at_midpoint(line, f, x);
         const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_midpoint(line, g, x);
         double jump = edge.intersects ? 0 : jump_strength(line, f1, f2);
+        if (jump > 0) jump = std::min(jump, largest_jump(line, f, g, edge.before, edge.after));
         double crease = crease_strength(f1, f2);
 
-        const double sigma = (line.sigma_at(edge.before) + line.sigma_at(edge.after)) / 2;
+        const int n1 = a.segments[i].size(), n2 = a.segments[j].size();
+        const FitDeviation slope1 = slope_deviation(line, edge.before, n1, f1.slope_variance);
+        const FitDeviation slope2 = slope_deviation(line, edge.after, n2, f2.slope_variance);
+        const FitDeviation of_jump = jump_deviation(value_deviation(line, edge.before, n1, f1.value_variance),
+                                                    value_deviation(line, edge.after, n2, f2.value_variance));
+        const FitDeviation of_crease = crease_deviation(f1, slope1, f2, slope2);
         const double difference = std::abs(f1.ordinate - f2.ordinate);
-        double of_jump = difference / jump_deviation(f1, f2, sigma);
-        double of_crease = crease / crease_deviation(f1, f2, sigma);
+        double jump_significance = difference / of_jump.shared, crease_significance = crease / of_crease.shared;
         const double least = std::min(lone_significance, options_.min_significance);
-        if (!std::isfinite(jump) || !(of_jump >= least)) jump = of_jump = 0;
-        if (!std::isfinite(crease) || !(of_crease >= least)) crease = of_crease = 0;
+        if (!std::isfinite(jump) || !(difference >= least * of_jump.single)) jump = jump_significance = 0;
+        if (!std::isfinite(crease) || !(crease >= least * of_crease.single)) crease = crease_significance = 0;
+        bool jumps = jump > 0 && is_jump(line, edge.before, edge.after, difference, difference / of_jump.single);
+        if (jumps && is_smooth(line, edge.before, edge.after, steps, difference))
+            jump = jump_significance = 0, jumps = false;
+        if (jumps) crease = crease_significance = 0;
 
         Candidate c{};
-        c.jump = static_cast<float>(std::min(jump, static_cast<double>(std::numeric_limits<float>::max())));
+        c.jump = within_range(jump);
         c.crease = static_cast<float>(crease);
-        const double significance = jump > 0 ? std::max(of_jump, of_crease) : of_crease;
+        const double significance = jump > 0 ? std::max(jump_significance, crease_significance) : crease_significance;
         c.significance = std::min(static_cast<float>(significance), endless);
-        const double tolerance = std::max(line.tolerance_at(edge.before), line.tolerance_at(edge.after));
-        if (jump > 0 && difference > jump_tolerances * tolerance && of_jump > jump_significance)
-            c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
+        if (jumps) c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
         if (crease > 0) c.kind |= is_convex(f1, f2) ? convex_bit : concave_bit;
         locate(c, line, edge);
-        c.sides[0] = side(line, f1);
-        c.sides[1] = side(line, f2);
+        c.sides[0] = side(line, f1, slope1.single);
+        c.sides[1] = side(line, f2, slope2.single);
         return c;
     }
 
@@ -88,9 +161,10 @@ private:
         c.plane_position[1] = static_cast<float>(w * d[1] + line.offset * d[0]);
     }
 
-    static Side side(const Line<T>& line, const EdgeSide& f) {
+    static Side side(const Line<T>& line, const EdgeSide& f, double slope_deviation) {
+        const double deviation = slope_deviation * line.per_step;
         return {static_cast<float>(f.ordinate), static_cast<float>(f.slope * line.per_step),
-                std::min(static_cast<float>(f.slope_variance * line.per_step * line.per_step), endless)};
+                std::min(static_cast<float>(deviation * deviation), endless)};
     }
 
     const ScanLineOptions& options_;
@@ -101,7 +175,7 @@ private:
 // Neighbouring lines of one direction, and the candidates on them.
 struct Part {
     int direction, first, count;
-    std::vector<Candidate> found;
+    Found found;
 };
 
 std::vector<Part> parts_of(int directions, int rows, int cols) {
@@ -114,10 +188,22 @@ std::vector<Part> parts_of(int directions, int rows, int cols) {
     return parts;
 }
 
+// Leaves no candidates on smeared pixels. Every direction has a chance to find these.
+void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, std::uint8_t* smeared) {
+    std::vector<std::int32_t> pixels;
+    for (const Part& part : parts) pixels.insert(pixels.end(), part.found.smeared.begin(), part.found.smeared.end());
+    int count = 0;
+    for (const int direction : all_directions) count += (directions & direction) != 0;
+    const SmearMask mask(rows, cols, pixels, count);
+    for (Part& part : parts) mask.clear_of_candidates(part.found.candidates);
+    if (smeared) mask.write(smeared);
+}
+
 }  // namespace
 
 template <class T>
-std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, int threads) {
+std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, int threads,
+                                       std::uint8_t* smeared) {
     std::vector<Part> parts = parts_of(options.directions, frame.rows, frame.cols);
     constexpr int parts_per_thread = 8;  // for fewer another thread is not worth starting
     Team team(std::min(threads, 1 + static_cast<int>(parts.size()) / parts_per_thread));
@@ -126,24 +212,25 @@ std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOpti
     team.run([&](int) {
         Strip<T> strip;
         Approximator<T> approximator(options);
-        std::vector<Candidate> found;
+        Found found;
         for (std::size_t i; (i = taken++) < parts.size();) {
             Part& part = parts[i];
             const LineDetector<T> detector(frame, options, part.direction);
             detector.read(part.first, part.count, strip);
-            found.clear();
+            found.candidates.clear(), found.smeared.clear();
             detector.detect(strip, approximator, found);
-            part.found.assign(found.begin(), found.end());
+            part.found = found;
         }
     });
+    clear_smear(parts, frame.rows, frame.cols, options.directions, smeared);
     std::int32_t order = 0;
     for (Part& part : parts)
-        for (Candidate& c : part.found) c.order = order++;
+        for (Candidate& c : part.found.candidates) c.order = order++;
     std::vector<Candidate> candidates(static_cast<std::size_t>(order));
     Cells cells(frame.rows, frame.cols);
-    for (const Part& part : parts) cells.count(part.found);
+    for (const Part& part : parts) cells.count(part.found.candidates);
     for (const Part& part : parts)
-        cells.assign(part.found, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
+        cells.assign(part.found.candidates, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
     parts.clear();
     join_neighbours(candidates, frame, options, team);
     return candidates;
@@ -154,7 +241,7 @@ void put_in_order(std::vector<Candidate>& candidates) {
               [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
 }
 
-template std::vector<Candidate> find_candidates(const Frame<float>&, const ScanLineOptions&, int);
-template std::vector<Candidate> find_candidates(const Frame<double>&, const ScanLineOptions&, int);
+template std::vector<Candidate> find_candidates(const Frame<float>&, const ScanLineOptions&, int, std::uint8_t*);
+template std::vector<Candidate> find_candidates(const Frame<double>&, const ScanLineOptions&, int, std::uint8_t*);
 
 }  // namespace rangeedge

@@ -1,10 +1,14 @@
 // Edge detection (paper, 4.2): every cut between two segments of a scan line is an edge candidate, whose position and
 // strengths the two curves give. Rows, columns and both diagonals are worked on independently of each other.
 //
+// A jump that is smeared over a few samples is one candidate (smear.hpp), and so is the end of a surface beside shadow
+// (shadow.hpp). The surfaces beside a jump do not meet: it has no crease.
+//
 // The paper keeps every candidate, since those that are no edges are weak. Here the noise decides: a candidate needs
 // a significance by itself, and later one together with its neighbours (neighbours.hpp).
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cstdint>
 #include <vector>
 
 #include "edges/candidate.hpp"
@@ -13,9 +17,11 @@
 
 namespace rangeedge {
 
-// All candidates, by their place in the image; the same for any number of threads.
+// All candidates, by their place in the image; the same for any number of threads. `smeared`, unless null, becomes 255 at
+// pixels over which a step is smeared (smear.hpp); it holds zeros before.
 template <class T>
-std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, int threads);
+std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, int threads,
+                                       std::uint8_t* smeared = nullptr);
 
 // Brings them into their order along directions and lines.
 void put_in_order(std::vector<Candidate>& candidates);

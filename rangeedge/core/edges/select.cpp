@@ -9,7 +9,8 @@
 
 namespace rangeedge {
 
-void long_components(const std::uint8_t* edges, int rows, int cols, int min_length, std::uint8_t* kept) {
+void keep_lines(const std::uint8_t* edges, int rows, int cols, int min_length, const float* significance,
+                float min_peak, std::uint8_t* kept) {
     const auto stride = static_cast<std::size_t>(cols) + 2, width = static_cast<std::size_t>(cols);
     std::vector<std::uint8_t> image(stride * (static_cast<std::size_t>(rows) + 2), 0);
     for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row)
@@ -19,10 +20,15 @@ void long_components(const std::uint8_t* edges, int rows, int cols, int min_leng
     const Components parts(image.data(), rows, cols, 8);
     for (int i = 0; i < parts.count(); ++i) {
         int left = cols, right = -1, top = rows, bottom = -1;
+        float peak = significance ? 0 : min_peak;
         for (const auto [begin, end] : parts.runs(i)) {
             left = std::min(left, parts.col_of(begin)), right = std::max(right, parts.col_of(end - 1));
             top = std::min(top, parts.row_of(begin)), bottom = std::max(bottom, parts.row_of(begin));
+            if (!significance) continue;
+            const float* first = significance + static_cast<std::size_t>(parts.row_of(begin)) * width + parts.col_of(begin);
+            peak = std::max(peak, *std::max_element(first, first + (end - begin)));
         }
+        if (!(peak >= min_peak)) continue;
         if (std::max(right - left, bottom - top) + 1 < min_length) continue;
         for (const auto [begin, end] : parts.runs(i)) {
             const auto row = static_cast<std::size_t>(parts.row_of(begin));

@@ -17,6 +17,7 @@
 // noise are told from edges.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <cmath>
 
 #include "base/angle.hpp"
@@ -33,6 +34,24 @@ struct EdgeSide {
     double value_variance, slope_variance;  // for samples of unit variance
     double angle_per_slope;
 };
+
+// A standard deviation by the noise, of what one scan line tells, and of what it tells as one of several neighbours.
+struct FitDeviation {
+    double single, shared;
+};
+
+// Of the slope and of the value of a fit to n samples beside sample k, by their variances for white noise of unit
+// variance.
+template <class T>
+FitDeviation slope_deviation(const Line<T>& line, int k, int n, double variance) {
+    const double white = line.noise_at(k).of_fit(n) * std::sqrt(variance);
+    return {line.noise->slope[n] * white, line.noise->shared_slope[n] * white};
+}
+template <class T>
+FitDeviation value_deviation(const Line<T>& line, int k, int n, double variance) {
+    const double white = line.noise_at(k).of_fit(n) * std::sqrt(variance);
+    return {line.noise->value[n] * white, line.noise->shared_value[n] * white};
+}
 
 // First form: the curve at the position x of the edge.
 template <class T>
@@ -61,6 +80,34 @@ double jump_strength(const Line<T>& line, const EdgeSide& f1, const EdgeSide& f2
     return std::abs(line.depth(f1.ordinate) - line.depth(f2.ordinate));
 }
 
+// No more than the difference of the depths at the end points, and what either curve adds to them on the way to x, which
+// is no more than it changes over the last sample before. Over a wide gap, or close to the horizon, a curve runs away.
+template <class T>
+double largest_jump(const Line<T>& line, const Curve& f1, const Curve& f2, int before, int after) {
+    const double x1 = line.abscissa(before), x2 = line.abscissa(after);
+    const double z1 = line.depth(f1.value(x1)), z2 = line.depth(f2.value(x2));
+    const double way = std::min((x2 - x1) / (after - before), (x2 - x1) / 2);
+    return std::abs(z1 - z2) + std::abs(z1 - line.depth(f1.value(x1 - way))) +
+           std::abs(z2 - line.depth(f2.value(x2 + way)));
+}
+
+// Whether the samples from `before` to `after` and two on either side run on too smoothly for a step of that size, which
+// curves that do not quite follow them pretend; not where one of them has no data. A sharp step has third differences of twice its size, an even ramp over n
+// samples of step / 2n.
+template <class T>
+bool is_smooth(const Line<T>& line, int before, int after, int n, double step) {
+    const int first = std::max(before - 2, 0), last = std::min(after + 2, line.path.size - 1);
+    const bool whole = last - first == after - before + 4;  // else half of them are to be seen
+    double largest = 0;
+    for (int k = first; k + 3 <= last; ++k) {
+        const double slopes = line.ordinate(k + 2) - line.ordinate(k + 1);
+        const double third = line.ordinate(k + 3) - 3 * slopes - line.ordinate(k);
+        if (!(std::abs(third) <= HUGE_VAL)) return false;  // no data
+        largest = std::max(largest, std::abs(third));
+    }
+    return last - first >= 3 && largest < (whole ? 1 : 0.5) * step / (2.5 * n - 1.5);
+}
+
 // The angle between the normals, in degrees: that between the tangents.
 inline double crease_strength(const EdgeSide& f1, const EdgeSide& f2) {
     return angle_between(cross(f1.tangent, f2.tangent), dot(f1.tangent, f2.tangent));
@@ -69,13 +116,14 @@ inline double crease_strength(const EdgeSide& f1, const EdgeSide& f2) {
 // f1' > f2': on a grid, with the tangents (1, -f1') and (1, -f2'), their cross product is f1' - f2'.
 inline bool is_convex(const EdgeSide& f1, const EdgeSide& f2) { return cross(f1.tangent, f2.tangent) > 0; }
 
-// The standard deviations of f1(x) - f2(x), an ordinate, and of the crease, for samples of deviation sigma.
-inline double jump_deviation(const EdgeSide& f1, const EdgeSide& f2, double sigma) {
-    return sigma * std::sqrt(f1.value_variance + f2.value_variance);
+// The standard deviations of f1(x) - f2(x), an ordinate, and of the crease in degrees, by those of values and slopes.
+inline FitDeviation jump_deviation(const FitDeviation& value1, const FitDeviation& value2) {
+    return {std::hypot(value1.single, value2.single), std::hypot(value1.shared, value2.shared)};
 }
-inline double crease_deviation(const EdgeSide& f1, const EdgeSide& f2, double sigma) {
-    const double a1 = f1.angle_per_slope, a2 = f2.angle_per_slope;
-    return degrees_per_radian * sigma * std::sqrt(a1 * a1 * f1.slope_variance + a2 * a2 * f2.slope_variance);
+inline FitDeviation crease_deviation(const EdgeSide& f1, const FitDeviation& slope1, const EdgeSide& f2,
+                                     const FitDeviation& slope2) {
+    const double a1 = degrees_per_radian * f1.angle_per_slope, a2 = degrees_per_radian * f2.angle_per_slope;
+    return {std::hypot(a1 * slope1.single, a2 * slope2.single), std::hypot(a1 * slope1.shared, a2 * slope2.shared)};
 }
 
 }  // namespace rangeedge

@@ -89,8 +89,14 @@ Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOpti
     return columns(candidates);
 }
 
-void keep_long_components(const Image<std::uint8_t>& edges, int min_length, const OutImage<std::uint8_t>& kept) {
-    long_components(edges.data(), rows(edges), cols(edges), min_length, kept.data());
+void flying_pixels(const BoundFrame& bound, const ScanLineOptions& options, int threads,
+                   const OutImage<std::uint8_t>& flying) {
+    std::visit([&](const auto& frame) { find_candidates(frame, options, threads, flying.data()); }, bound.frame);
+}
+
+void bound_keep_lines(const Image<std::uint8_t>& edges, int min_length, const Image<float>& significance, float min_peak,
+                      const OutImage<std::uint8_t>& kept) {
+    keep_lines(edges.data(), rows(edges), cols(edges), min_length, significance.data(), min_peak, kept.data());
 }
 
 void thin_to_lines(const Image<std::uint8_t>& edges, const Image<std::uint8_t>& preferred, int spur_length,
@@ -105,7 +111,8 @@ void bind_edges(nb::module_& m) {
     bind_options(m, "ScanLineOptions", field("eps", &O::eps), field("eps_factor", &O::eps_factor),
                  field("directions", &O::directions), field("interpolate", &O::interpolate),
                  field("endpoint", &O::endpoint), field("normals", &O::normals), field("max_shift", &O::max_shift),
-                 field("max_gap", &O::max_gap), field("merge_significance", &O::merge_significance),
+                 field("max_gap", &O::max_gap), field("max_smear", &O::max_smear), field("shadows", &O::shadows),
+                 field("spaced", &O::spaced), field("merge_significance", &O::merge_significance),
                  field("min_significance", &O::min_significance));
     m.def("split_scan_line", &split_scan_line<float>, array("y"), optional_array("x"), "eps"_a);
     m.def("split_scan_line", &split_scan_line<double>, array("y"), optional_array("x"), "eps"_a);
@@ -114,9 +121,11 @@ void bind_edges(nb::module_& m) {
           array("kind"), array("significance"), Unlocked());
     m.def("edge_strength_and_candidates", &edge_strength_and_candidates, "frame"_a, "options"_a, "threads"_a,
           array("jump"), array("crease"), array("kind"), array("significance"));
-    m.def("long_components", &keep_long_components, array("edges"), "min_length"_a, array("kept"), Unlocked());
+    m.def("flying_pixels", &flying_pixels, "frame"_a, "options"_a, "threads"_a, array("flying"), Unlocked());
     m.def("thin_lines", &thin_to_lines, array("edges"), optional_array("preferred"), "spur_length"_a, array("thin"),
           Unlocked());
+    m.def("keep_lines", &bound_keep_lines, array("edges"), "min_length"_a, optional_array("significance"), "min_peak"_a,
+          array("kept"), Unlocked());
 }
 
 }  // namespace rangeedge::python

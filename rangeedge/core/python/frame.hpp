@@ -3,6 +3,7 @@
 #pragma once
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <variant>
 
 #include "image/frame.hpp"
@@ -10,10 +11,23 @@
 
 namespace rangeedge::python {
 
+// The coefficients of the waves, and what FitNoise takes along rows and along columns.
+using FitsArray = std::array<double, 4 + 2 * FitNoise::size>;
+
 // They keep the arrays alive to which their kernels' side points.
 struct BoundNoise {
-    BoundNoise(double a, double b, double c, double correlation, Image<float> deviations)
-        : map(deviations), noise{a, b, c, correlation, deviations.data()} {}
+    BoundNoise(double a, double b, double c, const FitsArray& fits, Image<float> deviations)
+        : map(deviations) {
+        noise.single = {a, b, c, 0};
+        noise.waves = {fits[0], fits[1], fits[2], fits[3]};
+        noise.rows = FitNoise(&fits[4]);
+        noise.cols = FitNoise(&fits[4 + FitNoise::size]);
+        double diagonals[FitNoise::size];  // between those along rows and those along columns
+        for (std::size_t i = 0; i < FitNoise::size; ++i)
+            diagonals[i] = std::sqrt(fits[4 + i] * fits[4 + FitNoise::size + i]);
+        noise.diagonals = FitNoise(diagonals);
+        noise.map = deviations.data();
+    }
 
     Image<float> map;
     Noise noise;

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <nanobind/stl/array.h>
 
+#include <algorithm>
+
 #include "image/pixels.hpp"
-#include "noise/statistics.hpp"
+#include "noise/estimate.hpp"
 #include "python/frame.hpp"
 
 namespace rangeedge::python {
@@ -19,24 +21,21 @@ void bind_inverse(nb::module_& m) {
         array("depth"), "factor"_a, optional_array("mask"), array("inverse"), Unlocked());
 }
 
-using Numbers = nb::ndarray<nb::numpy, double, nb::ndim<1>>;
-
+// The coefficients of sigma, those of the waves, and what FitNoise takes along rows and along columns.
 template <class T>
-void bind_statistics(nb::module_& m) {
+void bind_estimate(nb::module_& m) {
     m.def(
-        "noise_statistics",
-        [](const Image<T>& ordinate,
-           int threads) -> nb::typed<nb::tuple, double, double, double, double, Numbers, Numbers> {
-            NoiseStatistics found;
-            {
-                nb::gil_scoped_release release;
-                found = noise_statistics(ordinate.data(), rows(ordinate), cols(ordinate), threads);
-            }
-            return nb::make_tuple(found.near, found.far, found.lowest, found.highest,
-                                  handed_over<double>(std::move(found.ordinates)),
-                                  handed_over<double>(std::move(found.deviations)));
+        "estimate_noise",
+        [](const Image<T>& ordinate, bool projective, double step, int threads) {
+            const NoiseEstimate e = estimate_noise(ordinate.data(), rows(ordinate), cols(ordinate), projective, step, threads);
+            std::array<double, 4 + FitsArray().size()> numbers;
+            auto next = numbers.begin();
+            for (const Deviation& d : {e.single, e.fits.waves}) next = std::copy_n(&d.c0, 4, next);
+            next = std::copy_n(e.fits.rows, FitNoise::size, next);
+            std::copy_n(e.fits.cols, FitNoise::size, next);
+            return numbers;
         },
-        array("ordinate"), "threads"_a);
+        array("ordinate"), "projective"_a, "step"_a, "threads"_a, Unlocked());
 }
 
 template <class T>
@@ -47,17 +46,16 @@ using FrameInit = nb::init<nb::ndarray<const T, nb::c_contig, nb::device::cpu>, 
 
 void bind_image(nb::module_& m) {
     nb::class_<BoundNoise>(m, "Noise", "Standard deviation a + b z + c z^2 of a length z, or that of every pixel.")
-        .def(nb::init<double, double, double, double, Image<float>>(), "a"_a, "b"_a, "c"_a, "correlation"_a,
-             optional_array("map") = nb::none())
-        .def_prop_ro("correlation", [](const BoundNoise& n) { return n.noise.correlation; });
+        .def(nb::init<double, double, double, const FitsArray&, Image<float>>(), "a"_a,
+             "b"_a, "c"_a, "fits"_a, optional_array("map") = nb::none());
     nb::class_<BoundFrame>(m, "Frame", "A range image: ordinates (H, W) or points (H, W, 3), NaN without data.")
         .def(FrameInit<float>(), array("samples"), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a)
         .def(FrameInit<double>(), array("samples"), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a);
     bind_inverse<float, float>(m);
     bind_inverse<double, double>(m);
     bind_inverse<std::uint16_t, float>(m);
-    bind_statistics<float>(m);
-    bind_statistics<double>(m);
+    bind_estimate<float>(m);
+    bind_estimate<double>(m);
 }
 
 }  // namespace rangeedge::python

@@ -4,6 +4,14 @@
 #include "scanline/fit.hpp"
 
 namespace rangeedge {
+namespace {
+
+template <class T>
+Samples<T> samples_of(const Line<T>& line) {
+    return {line.y, line.x, line.scale, line.path.size, static_cast<T>(line.tolerance)};
+}
+
+}  // namespace
 
 template <class T>
 void Approximator<T>::approximate(const Strip<T>& strip) {
@@ -19,8 +27,7 @@ void Approximator<T>::approximate(const Strip<T>& strip) {
 template <class T>
 void Approximator<T>::split(const Strip<T>& strip) {
     splitter_.clear();
-    for (const Line<T>& line : strip.lines)
-        splitter_.add({line.y, line.x, line.scale, line.path.size, static_cast<T>(line.tolerance)});
+    for (const Line<T>& line : strip.lines) splitter_.add(samples_of(line));
     splitter_.split();
     found_.clear();
     for (std::size_t i = 0; i < strip.lines.size(); ++i) {
@@ -33,11 +40,12 @@ void Approximator<T>::split(const Strip<T>& strip) {
 template <class T>
 void Approximator<T>::interpolate(const Strip<T>& strip) {
     found_.for_each(strip.lines, [&](const Line<T>& line, const Segment& s) {
+        const int m = midpoint(samples_of(line), s);
         PowerSums sums;
-        sums.origin = line.abscissa(s.midpoint());
-        sums.base = line.ordinate(s.midpoint());
+        sums.origin = line.abscissa(m);
+        sums.base = line.ordinate(m);
         int added = s.first - 1;
-        for (const int k : {s.first, s.midpoint(), s.last}) {
+        for (const int k : {s.first, m, s.last}) {
             if (k > added) sums.add(line.abscissa(k), line.ordinate(k));
             added = k;
         }

@@ -23,6 +23,8 @@ struct Approximation {
     const Segment* segments;
     const Curve* curves;
     std::ptrdiff_t count;
+
+    Fit fit(std::ptrdiff_t i) const { return {curves[i], segments[i].size()}; }
 };
 
 // Approximates strip after strip; what it needs for that is reused.

@@ -32,6 +32,12 @@ struct Curve {
     }
 };
 
+// A curve, and the number of samples to which it was fitted.
+struct Fit {
+    const Curve& curve;
+    int samples;
+};
+
 // Where f and g intersect, the place nearest `near`; false where they do not. Places farther than `reach` are not
 // sought, but may be found.
 inline bool intersection(const Curve& f, const Curve& g, double near, double reach, double& x) {

@@ -32,12 +32,11 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/angle.hpp"
 #include "image/frame.hpp"
+#include "scanline/segment.hpp"
 
 namespace rangeedge {
-
-enum Direction : std::uint8_t { rows_bit = 1, cols_bit = 2, diag45_bit = 4, diag135_bit = 8 };
-constexpr Direction all_directions[] = {rows_bit, cols_bit, diag45_bit, diag135_bit};
 
 // The pixels of one scan line: sample k lies at pixel (col + k dcol, row + k drow).
 struct Path {
@@ -51,7 +50,7 @@ struct Path {
 int line_count(int direction, int rows, int cols);
 Path line_path(int direction, int i, int rows, int cols);
 
-// A vector in the plane of a scan line, along a curve.
+// A vector in the plane of a scan line.
 struct Tangent {
     double s, r;
 };
@@ -62,6 +61,7 @@ inline double dot(const Tangent& a, const Tangent& b) { return a.s * b.s + a.r *
 template <class T>
 struct Line {
     const Frame<T>* frame = nullptr;
+    const FitNoise* noise = nullptr;  // of fits along the line
     Path path{};
     const T* y = nullptr;      // ordinates; `padding` more samples than the path has may be read
     const T* x = nullptr;      // null where samples are one unit apart
@@ -75,7 +75,14 @@ struct Line {
     double ordinate(int k) const { return static_cast<double>(y[k]); }
     double depth(double ordinate) const { return frame->projective ? 1 / ordinate : -ordinate; }
     std::int64_t pixel(int k) const { return path.pixel(k, frame->cols); }
-    double sigma_at(int k) const { return frame->noise.correlated_sigma(ordinate(k), pixel(k), frame->projective); }
+    // The noise of sample k, of the border between two samples, and of a segment.
+    SampleNoise noise_at(int k) const {
+        const double q = ordinate(k);
+        const std::int64_t p = pixel(k);
+        return {frame->noise.sigma(q, p, frame->projective), frame->noise.waves_at(q, p, frame->projective)};
+    }
+    SampleNoise noise_between(int i, int k) const { return mean(noise_at(i), noise_at(k)); }
+    SampleNoise noise_of(const Segment& s) const { return noise_between(s.left_middle(), s.right_middle()); }
     double tolerance_at(int k) const { return scale ? 1 / static_cast<double>(scale[k]) : tolerance; }
 
     // Of a curve that has this value and slope, by the abscissa, at an abscissa.
@@ -84,9 +91,22 @@ struct Line {
         if (!frame->projective) return {1, -m};
         return {value - (start + step * abscissa) * m, -kappa * m};
     }
+    // The angle at which the line of sight meets the straight line from sample i to sample k, in degrees.
+    double grazing_angle(int i, int k) const {
+        const Tangent a = point(i), b = point(k), way{b.s - a.s, b.r - a.r};
+        const Tangent sight = frame->projective ? Tangent{a.s + b.s, a.r + b.r} : Tangent{0, 1};
+        return angle_between(cross(way, sight), std::abs(dot(way, sight)));
+    }
     // How fast the angle of that tangent changes with the slope.
     double angle_per_slope(const Tangent& t, double value) const {
         return (frame->projective ? kappa * value : 1) * per_step / dot(t, t);
+    }
+
+private:
+    // The coordinates (s, r) of a sample.
+    Tangent point(int k) const {
+        const double w = start + step * abscissa(k), z = depth(ordinate(k));
+        return frame->projective ? Tangent{w * z, kappa * z} : Tangent{w, z};
     }
 };
 

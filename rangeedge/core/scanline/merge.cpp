@@ -2,6 +2,7 @@
 #include "scanline/merge.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "scanline/fit.hpp"
 
@@ -23,8 +24,8 @@ void Merger<T, List>::merge() {
         for (const int i : chosen_) {
             const int right = next(i);
             segment(i).last = segment(right).last;
-            sigma(i) = sigma(right);
-            set_sums(i, list_.sums(i) + list_.sums(right), sigma_of(i));
+            list_.sigma[i] = list_.sigma[right], list_.waves[i] = list_.waves[right];
+            set_sums(i, list_.sums(i) + list_.sums(right));
             remove(right);
         }
         cuts_.clear();
@@ -61,45 +62,79 @@ void Merger<T, List>::choose() {
 template <class T, class List>
 void Merger<T, List>::remove_bridges(Array<Curve>& curves) {
     if (!(limit_ > 0)) return;
-    for (int i = next(0); i != end_ && next(i) != end_;) {
-        const int before = previous(i), after = next(i);
-        i = !remove_if_bridge(i, curves) || previous(before) == end_ ? after : before;
+    Array<int>&changed = cuts_, &bridges = chosen_;
+    changed.clear(), bridges.clear();
+    for (int i = next(end_); i != end_; i = next(i)) changed.push_back(i);
+    while (!changed.empty()) {
+        for (const int i : changed) {
+            cost(i) = sides_without(i, curves).cost;
+            if (cost(i) < HUGE_VAL && !chosen(i)) bridges.push_back(i);
+            chosen(i) |= cost(i) < HUGE_VAL;
+        }
+        changed.clear();
+        const auto kept = std::partition(bridges.begin(), bridges.end(), [&](int i) { return !cheapest_bridge(i); });
+        for (auto i = kept; i != bridges.end(); ++i) remove_bridge(*i, curves, changed);
+        bridges.resize(kept - bridges.begin());
     }
 }
 
 template <class T, class List>
-bool Merger<T, List>::remove_if_bridge(int i, Array<Curve>& curves) {
+typename Merger<T, List>::Sides Merger<T, List>::sides_without(int i, const Array<Curve>& curves) {
     const int before = previous(i), after = next(i);
-    if (!(sigma(before) > 0 && sigma(i) > 0)) return false;  // not adjacent
+    if (before == end_ || after == end_ || !(list_.sigma[before] > 0 && list_.sigma[i] > 0)) return {};  // not adjacent
     const Segment s = segment(i);
     const Line<T>& line = line_of(i);
     const double begin = line.abscissa(s.first - 1), end = line.abscissa(s.last + 1);
     const double middle = (line.abscissa(s.first) + line.abscissa(s.last)) / 2;
     double x = 0;
-    if (!intersection(curves[before], curves[after], middle, std::max(middle - begin, end - middle), x)) return false;
-    if (x < begin || x > end) return false;
-    int cut = s.first - 1;
-    while (cut < s.last && line.abscissa(cut + 1) <= x) ++cut;
-    auto left = list_.sums(before), right = list_.sums(after);
-    if (cut >= s.first) left = left + List::sums_over(line, {s.first, cut});
-    if (cut < s.last) right = List::sums_over(line, {cut + 1, s.last}) + right;
-    const double deviation = sigma_of(i), least = SegmentList::least_of(deviation);
-    const double rise = residual_squares(left, least) + residual_squares(right, least) -
-                        (residual(before) + residual(i) + residual(after));
-    if (!(rise < bridge_factor * bridge_factor * limit_ * deviation * deviation)) return false;
-    segment(before).last = cut;
-    segment(after).first = cut + 1;
-    set_sums(before, left, deviation);
-    set_sums(after, right, deviation);
-    remove(i);
-    curves[before] = list_.curve(before), curves[after] = list_.curve(after);
-    return true;
+    if (!intersection(curves[before], curves[after], middle, std::max(middle - begin, end - middle), x)) return {};
+    if (x < begin || x > end) return {};
+    Sides sides;
+    sides.cut = s.first - 1;
+    while (sides.cut < s.last && line.abscissa(sides.cut + 1) <= x) ++sides.cut;
+    sides.left = list_.sums(before), sides.right = list_.sums(after);
+    if (sides.cut >= s.first) sides.left = sides.left + List::sums_over(line, {s.first, sides.cut});
+    if (sides.cut < s.last) sides.right = List::sums_over(line, {sides.cut + 1, s.last}) + sides.right;
+    const double deviation = list_.noise().join[s.size()] * line.noise_of(s).of_fit(s.size());
+    const double joint = residual_squares(sides.left, least_of(i, sides.left)) +
+                         residual_squares(sides.right, least_of(i, sides.right));
+    const double rise = joint - (residual(before) + residual(i) + residual(after));
+    const double cost = rise / (deviation * deviation);
+    if (cost < bridge_factor * bridge_factor * limit_) sides.cost = cost;
+    return sides;
 }
 
 template <class T, class List>
-template <class Sums>
-void Merger<T, List>::set_sums(int i, const Sums& sums, double sigma) {
-    list_.least[i] = SegmentList::least_of(sigma);
+bool Merger<T, List>::cheapest_bridge(int i) {
+    const int before = previous(i), after = next(i);
+    return cost(i) < HUGE_VAL && cost(i) < cost(before) && cost(i) < cost(previous(before)) &&
+           cost(i) <= cost(after) && cost(i) <= cost(next(after));
+}
+
+template <class T, class List>
+void Merger<T, List>::remove_bridge(int i, Array<Curve>& curves, Array<int>& changed) {
+    const Sides sides = sides_without(i, curves);
+    const int before = previous(i), after = next(i);
+    segment(before).last = sides.cut;
+    segment(after).first = sides.cut + 1;
+    set_sums(before, sides.left);
+    set_sums(after, sides.right);
+    remove(i);
+    for (const int k : {before, after}) curves[k] = list_.curve(k);
+    for (const int k : {previous(before), before, after, next(after)})
+        if (k != end_) changed.push_back(k);
+}
+
+// The significance of a quadratic term of these sums, where the noise is that of a segment.
+template <class T, class List>
+double Merger<T, List>::least_of(int i, const Sums& sums) {
+    const Line<T>& line = line_of(i);
+    return least_quadratic(line.noise_of(segment(i)), static_cast<int>(sums.n), line.noise->slope);
+}
+
+template <class T, class List>
+void Merger<T, List>::set_sums(int i, const Sums& sums) {
+    list_.least[i] = least_of(i, sums);
     list_.set_sums(i, sums);
     residual(i) = residual_squares(sums, list_.least[i]);
 }

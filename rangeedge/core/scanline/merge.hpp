@@ -6,7 +6,10 @@
 // of it, or of its rounding, and leave a short segment across it where one cut would do.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cmath>
 #include <cstddef>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "base/array.hpp"
@@ -34,7 +37,7 @@ public:
     // the cuts beside them.
     void merge();
     // Removes segments where the curves beside them intersect within them and, given their samples, explain these
-    // nearly as well.
+    // nearly as well: in every round those that cost less than any other whose surfaces they would change.
     void remove_bridges(Array<Curve>& curves);
 
 private:
@@ -42,17 +45,24 @@ private:
     int& next(int i) { return list_.links[i].next; }
     bool& chosen(int i) { return list_.links[i].chosen; }
     Segment& segment(int i) { return list_.links[i].segment; }
-    double& sigma(int i) { return list_.sigma[i]; }
     double& residual(int i) { return list_.residual[i]; }
     double& cost(int i) { return list_.cost[i]; }
     const Line<T>& line_of(int i) { return lines_[static_cast<std::size_t>(list_.links[i].line)]; }
-    double sigma_of(int i) { return line_of(i).sigma_at(segment(i).reference()); }
 
     void choose();
-    template <class Sums>
-    void set_sums(int i, const Sums& sums, double sigma);
     void remove(int i);
-    bool remove_if_bridge(int i, Array<Curve>& curves);
+    // What becomes of the segments beside a bridge that is removed: the last sample of the left one, and their sums.
+    using Sums = std::decay_t<decltype(std::declval<const List&>().sums(0))>;
+    struct Sides {
+        int cut = 0;
+        Sums left{}, right{};
+        double cost = HUGE_VAL;  // rise of the sum of squares, in variances; infinite where the segment is no bridge
+    };
+    Sides sides_without(int i, const Array<Curve>& curves);
+    bool cheapest_bridge(int i);
+    void remove_bridge(int i, Array<Curve>& curves, Array<int>& changed);
+    double least_of(int i, const Sums& sums);
+    void set_sums(int i, const Sums& sums);
 
     const std::vector<Line<T>>& lines_;
     double limit_;  // variances

@@ -13,6 +13,9 @@ struct ScanLineOptions {
     bool normals;               // crease angles between surface normals instead of the largest of the directions
     double max_shift;           // samples from the cut to the position of the edge
     int max_gap;                // samples without data between two segments that are compared
+    int max_smear;              // samples of a smeared step
+    bool shadows;               // whether the two sides of a wider gap are compared for outlines
+    bool spaced;                // whether the spacing of pixels is known as a length
     double merge_significance;  // standard deviations below which a cut is taken back
     double min_significance;    // standard deviations below which a candidate is dropped
 };

@@ -20,13 +20,25 @@ T inverse(T tolerance) {
     return 1 / (tolerance > finest ? tolerance : finest);
 }
 
-void inverse_of(const Quadratic<double>& tolerance, const double* y, int n, double* result) {
-    for (int k = 0; k < n; ++k) result[k] = inverse(tolerance.at(std::abs(y[k])));
+// 1 / (c0 + c1 |y| + c2 y^2 + c3 |y|^3) of lengths, y / (c3 + c2 y + c1 y^2 + c0 y^3) of inverse depths.
+template <class T>
+RANGEEDGE_INLINE void invert_deviations(const Deviation& of, bool projective, const T* y, int n, T* result) {
+    const auto c0 = static_cast<T>(of.c0), c1 = static_cast<T>(of.c1), c2 = static_cast<T>(of.c2);
+    const auto c3 = static_cast<T>(of.c3);
+    if (projective)
+        for (int k = 0; k < n; ++k) result[k] = inverse((((c0 * y[k] + c1) * y[k] + c2) * y[k] + c3) / y[k]);
+    else
+        for (int k = 0; k < n; ++k) {
+            const T z = std::abs(y[k]);
+            result[k] = inverse(((c3 * z + c2) * z + c1) * z + c0);
+        }
+}
+void inverse_of(const Deviation& tolerance, bool projective, const double* y, int n, double* result) {
+    invert_deviations(tolerance, projective, y, n, result);
 }
 RANGEEDGE_WIDE
-void inverse_of(const Quadratic<float>& tolerance, const float* y, int n, float* result) {
-    const Quadratic<float> own = tolerance;
-    for (int k = 0; k < n; ++k) result[k] = inverse(own.at(std::abs(y[k])));
+void inverse_of(const Deviation& tolerance, bool projective, const float* y, int n, float* result) {
+    invert_deviations(tolerance, projective, y, n, result);
 }
 
 struct Vector {
@@ -71,6 +83,7 @@ void LineReader<T>::read(int direction, int first, int count, Strip<T>& strip) c
         Line<T>& line = strip.lines[static_cast<std::size_t>(j)];
         line = {};
         line.frame = &frame_;
+        line.noise = &frame_.noise.along(direction);
         line.path = line_path(direction, first + j, frame_.rows, frame_.cols);
         longest = std::max(longest, line.path.size);
     }
@@ -179,18 +192,18 @@ template <class T>
 void LineReader<T>::set_tolerance(Line<T>& line, T* scale) const {
     const Noise& noise = frame_.noise;
     const bool given = options_.eps > 0, mapped = noise.map && !given;
-    const double factor = given ? options_.eps : options_.eps_factor * noise.correlation;
-    const Noise length = given ? Noise{factor} : Noise{factor * noise.a, factor * noise.b, factor * noise.c};
-    const Quadratic<double> tolerance = length.of_ordinates(frame_.projective);
-    if (!mapped && tolerance.c1 == 0 && tolerance.c2 == 0) {
-        line.tolerance = given ? factor : options_.eps_factor * noise.correlated_sigma(1, 0, frame_.projective);
+    const double factor = given ? options_.eps : options_.eps_factor * line.noise->residual;
+    const Deviation tolerance = given ? Deviation{factor} : noise.waves.times(factor);
+    // The same everywhere: a length on a grid, or one that grows with the square of the depth.
+    const double other = frame_.projective ? tolerance.c0 : tolerance.c2;
+    if (!mapped && other == 0 && tolerance.c1 == 0 && tolerance.c3 == 0) {
+        line.tolerance = std::max(frame_.projective ? tolerance.c2 : tolerance.c0, Noise::finest);
         return;
     }
     line.scale = scale;
     const int size = line.path.size;
     if (!mapped) {
-        const auto [c0, c1, c2] = tolerance;
-        inverse_of({static_cast<T>(c0), static_cast<T>(c1), static_cast<T>(c2)}, line.y, size, scale);
+        inverse_of(tolerance, frame_.projective, line.y, size, scale);
         return;
     }
     for (int k = 0; k < size; ++k) {

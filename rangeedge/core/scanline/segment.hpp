@@ -8,9 +8,10 @@ struct Segment {
     int first, last;
 
     int size() const { return last - first + 1; }
-    // The midpoint through which splitting and interpolation lay their curve, the left one of two (paper, 4.1).
-    int midpoint() const { return first + (last - first) / 2; }
-    // The sample whose noise stands for the segment, and from which sums over it are counted; the right one of two.
+    // The samples in the middle, which are one where their number is odd.
+    int left_middle() const { return first + (last - first) / 2; }
+    int right_middle() const { return last - (last - first) / 2; }
+    // The sample from which sums over the segment are counted.
     int reference() const { return first + size() / 2; }
 };
 

@@ -55,13 +55,16 @@ struct Columns {
     OrthogonalSums operator[](std::ptrdiff_t i) const { return {n[i], mean[i], y1[i], y2[i], squares[i]}; }
 };
 
-// What it costs to join each segment on the left with that on the right.
+// What it costs to join each segment on the left with that on the right, whose common border is off by sigma and waves.
 RANGEEDGE_WIDE
-void compute_costs(std::ptrdiff_t count, const Columns left, const Columns right, const double* sigma, double* cost) {
+void compute_costs(std::ptrdiff_t count, const Columns left, const Columns right, const double* sigma,
+                   const double* waves, const FitNoise& noise, double* cost) {
     RANGEEDGE_INDEPENDENT
     for (std::ptrdiff_t i = 0; i < count; ++i) {
-        const double joint = residual_squares(left[i] + right[i], SegmentList::least_of(sigma[i]));
-        cost[i] = SegmentList::cost_of(joint, left.residual[i], right.residual[i], sigma[i]);
+        const int n = static_cast<int>(left.n[i]), m = static_cast<int>(right.n[i]);
+        const SampleNoise own{sigma[i], waves[i]};
+        const double joint = residual_squares(left[i] + right[i], least_quadratic(own, n + m, noise.slope));
+        cost[i] = cost_of_joining(joint, left.residual[i], right.residual[i], own, n, m, noise.join);
     }
 }
 
@@ -72,7 +75,8 @@ void SegmentList::fill(const std::vector<Line<T>>& lines, const StripSegments& f
     const std::ptrdiff_t count = found.segments.size();
     links.resize(count + 1);
     links[count] = {{}, 0, static_cast<int>(count) - 1, 0, false};
-    for (auto* numbers : {&sigma, &least, &residual, &cost}) {
+    noise_ = lines.front().noise;
+    for (auto* numbers : {&sigma, &waves, &least, &residual, &cost}) {
         numbers->resize(in_lanes(count + 1) + 1);
         std::fill(numbers->begin() + count, numbers->end(), 0.0);
     }
@@ -85,8 +89,9 @@ void SegmentList::fill(const std::vector<Line<T>>& lines, const StripSegments& f
             const bool adjacent = own + 1 < last && s.last + 1 == found.segments[own + 1].first &&
                                   line.abscissa(s.last) < line.abscissa(s.last + 1);
             links[own] = {s, i, own > 0 ? own - 1 : end(), own + 1, false};
-            sigma[own] = adjacent ? line.sigma_at(s.last) : 0;
-            least[own] = least_of(line.sigma_at(s.reference()));
+            const SampleNoise border = adjacent ? line.noise_between(s.last, s.last + 1) : SampleNoise{0, 0};
+            sigma[own] = border.sigma, waves[own] = border.waves;
+            least[own] = least_quadratic(line.noise_of(s), s.size(), line.noise->slope);
         }
     }
 }
@@ -128,15 +133,15 @@ void EvenSegments::sum_up(const std::vector<Line<T>>& lines) {
 void EvenSegments::update_all_costs() {
     const Columns left{column(n), column(mean), column(y1), column(y2), column(squares), residual.data()};
     const Columns right{left.n + 1, left.mean + 1, left.y1 + 1, left.y2 + 1, left.squares + 1, left.residual + 1};
-    compute_costs(in_lanes(links.size()), left, right, sigma.data(), cost.data());
+    compute_costs(in_lanes(links.size()), left, right, sigma.data(), waves.data(), noise(), cost.data());
 }
 
 // Gathered first, to be computed side by side: six numbers of each segment on the left, of each one on the right,
-// sigma, and then the cost.
+// sigma and waves, and then the cost.
 void EvenSegments::update_costs(const Array<int>& cuts) {
     constexpr int numbers = columns + 1;
     const std::ptrdiff_t count = in_lanes(cuts.size());
-    gathered_.resize((2 * numbers + 2) * count);
+    gathered_.resize((2 * numbers + 3) * count);
     const auto part = [&](int i) { return gathered_.data() + i * count; };
     for (std::ptrdiff_t k = 0; k < cuts.size(); ++k) {
         const int pair[2] = {cuts[k], links[cuts[k]].next};
@@ -145,12 +150,14 @@ void EvenSegments::update_costs(const Array<int>& cuts) {
             part(side * numbers + columns)[k] = residual[pair[side]];
         }
         part(2 * numbers)[k] = sigma[cuts[k]];
+        part(2 * numbers + 1)[k] = waves[cuts[k]];
     }
     const auto side = [&](int i) {
         return Columns{part(i), part(i + 1), part(i + 2), part(i + 3), part(i + 4), part(i + 5)};
     };
-    compute_costs(count, side(0), side(numbers), part(2 * numbers), part(2 * numbers + 1));
-    for (std::ptrdiff_t k = 0; k < cuts.size(); ++k) cost[cuts[k]] = part(2 * numbers + 1)[k];
+    double* const costs = part(2 * numbers + 2);
+    compute_costs(count, side(0), side(numbers), part(2 * numbers), part(2 * numbers + 1), noise(), costs);
+    for (std::ptrdiff_t k = 0; k < cuts.size(); ++k) cost[cuts[k]] = costs[k];
 }
 
 void EvenSegments::fit(Array<Curve>& curves) const {
@@ -188,8 +195,10 @@ void UnevenSegments::update_cost(int i) {
     cost[i] = HUGE_VAL;
     if (!(sigma[i] > 0)) return;
     const int right = links[i].next;
-    const double joint = residual_squares(sums_[i] + sums_[right], least_of(sigma[i]));
-    cost[i] = cost_of(joint, residual[i], residual[right], sigma[i]);
+    const SampleNoise border{sigma[i], waves[i]};
+    const int n = links[i].segment.size(), m = links[right].segment.size();
+    const double joint = residual_squares(sums_[i] + sums_[right], least_quadratic(border, n + m, noise().slope));
+    cost[i] = cost_of_joining(joint, residual[i], residual[right], border, n, m, noise().join);
 }
 
 void UnevenSegments::fit(Array<Curve>& curves) const {

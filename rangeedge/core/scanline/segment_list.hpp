@@ -44,7 +44,8 @@ public:
         bool chosen;
     };
     Array<Link> links;
-    Array<double> sigma;     // of the noise where the segment ends, 0 where the next one is not adjacent
+    Array<double> sigma;     // of single samples where the segment ends, 0 where the next one is not adjacent
+    Array<double> waves;     // and that of fits to many samples there
     Array<double> least;     // significance of a quadratic term, in the unit of the ordinates
     Array<double> residual;  // sum of squares
     Array<double> cost;      // of taking back the cut on the right
@@ -55,17 +56,29 @@ public:
     // The segments that are left, in place of all; their curves move together.
     void collect(StripSegments& found) const;
 
-    // The significance that a quadratic term must have where the noise is sigma.
-    static double least_of(double sigma) { return curved_significance * sigma; }
-    // By how much the sum of squared residuals rises where one segment takes the place of two, in variances.
-    static double cost_of(double joint, double left, double right, double sigma) {
-        const double cost = (joint - left - right) / (sigma * sigma);
-        return sigma > 0 && cost == cost ? cost : HUGE_VAL;
-    }
+    // The noise of fits along the lines of the strip.
+    const FitNoise& noise() const { return *noise_; }
 
 private:
-    static constexpr double curved_significance = 5;  // standard deviations
+    const FitNoise* noise_ = nullptr;
 };
+
+// The significance that a quadratic term must have over n samples, in the unit of the ordinates: such a term is the
+// difference of the slopes of two halves.
+inline double least_quadratic(const SampleNoise& noise, int n, const FitFactors& slope) {
+    constexpr double curved_significance = 6;  // standard deviations
+    return curved_significance * slope[n / 2] * noise.of_fit(n);
+}
+// By how much the sum of squared residuals rises where one segment takes the place of two of n and m samples, in
+// variances of the fit to the shorter one; of equal costs, rounding included, that of fewer samples is lower.
+inline double cost_of_joining(double joint, double left, double right, const SampleNoise& noise, int n, int m,
+                              const FitFactors& join) {
+    constexpr double tie = 1e-6;  // of a cost, for every sample
+    const int shorter = std::min(n, m);
+    const double deviation = join[shorter] * noise.of_fit(shorter);
+    const double cost = (joint - left - right) / (deviation * deviation) + tie * (n + m);
+    return noise.sigma > 0 && cost == cost ? cost : HUGE_VAL;
+}
 
 // Of samples one unit apart.
 class EvenSegments : public SegmentList {

@@ -54,16 +54,19 @@ struct ThreePoint {
     int m;
     T origin, ym, a, b;
 
-    ThreePoint(const Samples<T>& line, const Segment& s) {
-        m = s.midpoint();
-        const T left = line.x ? line.x[m] - line.x[s.first] : static_cast<T>(m - s.first);
-        const T right = line.x ? line.x[s.last] - line.x[m] : static_cast<T>(s.last - m);
-        const T slope_left = (line.y[m] - line.y[s.first]) / left;
-        const T slope_right = (line.y[s.last] - line.y[m]) / right;
+    ThreePoint(const Samples<T>& line, const Segment& s) : m(midpoint(line, s)) {
         origin = line.x ? line.x[m] : static_cast<T>(m);
         ym = line.y[m];
-        a = (slope_right - slope_left) / (left + right);
-        b = slope_left + a * left;
+        const T left = line.width(s.first, m), right = line.width(m, s.last), inverse = 1 / line.width(s.first, s.last);
+        if (m == s.first) {
+            a = 0;
+            b = (line.y[s.last] - line.y[m]) * inverse;
+            return;
+        }
+        const T slope_left = (line.y[m] - line.y[s.first]) / left;
+        const T slope_right = (line.y[s.last] - line.y[m]) / right;
+        a = (slope_right - slope_left) * inverse;
+        b = (slope_left * right + slope_right * left) * inverse;
     }
     T residual(T x, T y) const {
         const T t = x - origin;
@@ -71,29 +74,38 @@ struct ThreePoint {
     }
 };
 
-// The sample of the largest residual, if that exceeds the line's eps; else -1.
+// The first and the last of some samples; negative where there are none.
+struct Ends {
+    int first = -1, last = -1;
+};
+
+// The samples of the largest residual, if that exceeds the line's eps.
 template <class T>
-int worst_sample(const Samples<T>& line, const Segment& s) {
+Ends worst_samples(const Samples<T>& line, const Segment& s) {
     const ThreePoint<T> curve(line, s);
     T largest = line.eps;
-    int worst = -1;
+    Ends worst;
     for (int k = s.first + 1; k < s.last; ++k) {
         T r = curve.residual(line.x ? line.x[k] : static_cast<T>(k), line.y[k]);
         if (line.scale) r *= line.scale[k];
-        if (r > largest) largest = r, worst = k;
+        if (r > largest)
+            largest = r, worst = {k, k};
+        else if (r == largest && worst.first >= 0)
+            worst.last = k;
     }
     return worst;
 }
 
 // The same for samples one unit apart, sixteen at a time: each lane keeps its own worst.
 template <int bytes>
-RANGEEDGE_INLINE int worst_sample_in(const Samples<float>& line, const Segment& s) {
+RANGEEDGE_INLINE Ends worst_samples_in(const Samples<float>& line, const Segment& s) {
     using F = Floats<bytes>;
     using I = Ints<bytes>;
     const ThreePoint<float> curve(line, s);
     const F ym = F::all(curve.ym), a = F::all(curve.a), b = F::all(curve.b);
+    const I beyond = I::all(s.last), before = I::all(-1);
     F worst = F::all(-1);
-    I at = I::all(s.last);
+    I first = beyond, last = before;
     const auto look = [&](int k, int count) RANGEEDGE_ALWAYS {
         const F t = F::from(static_cast<float>(k - curve.m));
         F r = abs(F::load(line.y + k) - (ym + t * (b + a * t)));
@@ -101,21 +113,26 @@ RANGEEDGE_INLINE int worst_sample_in(const Samples<float>& line, const Segment& 
         if (count < F::count) r = keep_first(r, count);
         const I index = I::from(k);
         for (int p = 0; p < F::parts; ++p) {
-            const auto larger = r.part[p] > worst.part[p];
+            const auto larger = r.part[p] > worst.part[p], as_large = r.part[p] >= worst.part[p];
             worst.part[p] = larger ? r.part[p] : worst.part[p];
-            at.part[p] = larger ? index.part[p] : at.part[p];
+            first.part[p] = larger ? index.part[p] : first.part[p];
+            last.part[p] = as_large ? index.part[p] : last.part[p];
         }
     };
     int k = s.first + 1;
     for (; k + F::count <= s.last; k += F::count) look(k, F::count);
     if (k < s.last) look(k, s.last - k);
     const float largest = worst.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; });
-    if (!(largest > line.eps)) return -1;
-    // The first of the lanes that have it, without branches: which these are cannot be foretold.
+    if (!(largest > line.eps)) return {};
+    // Of the lanes that have it, without branches: which these are cannot be foretold.
     const F everywhere = F::all(largest);
-    const I beyond = I::all(s.last);
-    for (int p = 0; p < F::parts; ++p) at.part[p] = worst.part[p] == everywhere.part[p] ? at.part[p] : beyond.part[p];
-    return at.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p < q ? p : q; });
+    for (int p = 0; p < F::parts; ++p) {
+        const auto here = worst.part[p] == everywhere.part[p];
+        first.part[p] = here ? first.part[p] : beyond.part[p];
+        last.part[p] = here ? last.part[p] : before.part[p];
+    }
+    return {first.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p < q ? p : q; }),
+            last.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; })};
 }
 
 // Of `count` pending nodes, those to be cut; returns how many. Lines without abscissae.
@@ -126,8 +143,8 @@ RANGEEDGE_INLINE std::ptrdiff_t find_worst_of_even_in(const Samples<float>* line
     std::ptrdiff_t found = 0;
     for (std::ptrdiff_t i = 0; i < count; ++i) {
         const Splitter<float>::Node& node = nodes[pending[i]];
-        const int sample = worst_sample_in<bytes>(lines[node.line], node.segment);
-        if (sample >= 0) worst[found++] = {pending[i], sample};
+        const Ends samples = worst_samples_in<bytes>(lines[node.line], node.segment);
+        if (samples.first >= 0) worst[found++] = {pending[i], samples.first, samples.last};
     }
     return found;
 }
@@ -135,6 +152,22 @@ RANGEEDGE_VERSIONS(std::ptrdiff_t, find_worst_of_even,
                    (const Samples<float>* lines, const Splitter<float>::Node* nodes, const int* pending,
                     std::ptrdiff_t count, Splitter<float>::Worst* worst),
                    (lines, nodes, pending, count, worst))
+
+// The sample behind which a segment is cut at an extreme one: that joins the neighbour it is closer to, of equally
+// close ones the one farther from the middle.
+template <class T>
+int cut_at(const T* y, const Segment& s, int k) {
+    const T left = std::abs(y[k] - y[k - 1]), right = std::abs(y[k + 1] - y[k]);
+    const bool joins_left = left < right || (left == right && 2 * k < s.first + s.last);
+    return joins_left ? k : k - 1;
+}
+
+// Of several extreme samples the one closest to the middle of the segment counts, or both where two are equally close.
+template <class T>
+Ends cuts_at(const T* y, const Segment& s, int first, int last) {
+    const int off = first + last - s.first - s.last;
+    return {cut_at(y, s, off < 0 ? last : first), cut_at(y, s, off > 0 ? first : last)};
+}
 
 }  // namespace
 
@@ -174,8 +207,8 @@ void Splitter<T>::find_worst() {
     }
     std::ptrdiff_t found = 0;
     for (const int node : pending_) {
-        const int sample = worst_sample(lines_[nodes_[node].line], nodes_[node].segment);
-        if (sample >= 0) worst_[found++] = {node, sample};
+        const Ends samples = worst_samples(lines_[nodes_[node].line], nodes_[node].segment);
+        if (samples.first >= 0) worst_[found++] = {node, samples.first, samples.last};
     }
     worst_.resize(found);
 }
@@ -184,24 +217,32 @@ template <class T>
 void Splitter<T>::split() {
     for (; !pending_.empty(); pending_.swap(following_)) {
         find_worst();
-        int right = static_cast<int>(nodes_.size());  // the part on the right is a new node
+        int count = static_cast<int>(nodes_.size());
         std::ptrdiff_t follow = 0;
-        nodes_.resize(right + worst_.size());
-        following_.resize(2 * worst_.size());
+        nodes_.resize(count + 2 * worst_.size());
+        following_.resize(3 * worst_.size());
+        // The part on the right is a new node.
+        const auto cut_behind = [&](int i, int sample) {
+            Node& node = nodes_[i];
+            nodes_[count] = {{sample + 1, node.segment.last}, node.line, node.next};
+            node.segment.last = sample;
+            node.next = count;
+            return count++;
+        };
+        // Parts that a quadratic may not pass through follow; written first and counted then, without branches.
+        const auto follow_up = [&](int i) {
+            following_[follow] = i;
+            follow += nodes_[i].segment.size() > exact;
+        };
         for (const Worst& worst : worst_) {
-            Node& node = nodes_[worst.node];
-            const T* y = lines_[node.line].y + worst.sample;
-            const bool joins_left = std::abs(y[0] - y[-1]) <= std::abs(y[1] - y[0]);
-            const int cut = joins_left ? worst.sample : worst.sample - 1;
-            nodes_[right] = {{cut + 1, node.segment.last}, node.line, node.next};
-            // Parts that a quadratic may not pass through follow; written first and counted then, without branches.
-            following_[follow] = worst.node;
-            follow += cut - node.segment.first >= exact;
-            following_[follow] = right;
-            follow += node.segment.last - cut > exact;
-            node.segment.last = cut;
-            node.next = right++;
+            const Node& node = nodes_[worst.node];
+            const Ends cuts = cuts_at(lines_[node.line].y, node.segment, worst.first, worst.last);
+            const int right = cut_behind(worst.node, cuts.first);
+            if (cuts.last > cuts.first) follow_up(cut_behind(right, cuts.last));
+            follow_up(worst.node);
+            follow_up(right);
         }
+        nodes_.resize(count);
         following_.resize(follow);
     }
 }

@@ -5,10 +5,12 @@
 //
 // The paper leaves open to which part the sample of the largest residual belongs. Here a cut falls between two samples:
 // this one goes with the neighbour whose value is closer, since on a jump one of the two lies on the other surface. A
-// line is also cut where samples have no data. Instead of by recursion the segments of one generation, of all lines of
+// line is also cut where samples have no data. No rule prefers a side, so that a mirrored line is cut at the same
+// places. Instead of by recursion the segments of one generation, of all lines of
 // a strip, are split in turn, so that a processor works on several at a time; the result is the same.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <cmath>
 #include <cstddef>
 
 #include "base/array.hpp"
@@ -52,7 +54,22 @@ struct Samples {
     const T* scale;
     int size;
     T eps;
+
+    T width(int i, int k) const { return x ? x[k] - x[i] : static_cast<T>(k - i); }
 };
+
+// The middle sample of a segment; of two, the one closer to the straight line between the ends, which is computed from
+// either end alike. Where they lie equally far on either side of that line it is the curve itself, and the first sample
+// is returned.
+template <class T>
+int midpoint(const Samples<T>& line, const Segment& s) {
+    const int m = s.left_middle(), n = s.right_middle();
+    const T slope = (line.y[s.last] - line.y[s.first]) / line.width(s.first, s.last);
+    const T left = line.y[m] - line.y[s.first] - slope * line.width(s.first, m);
+    const T right = line.y[n] - line.y[s.last] + slope * line.width(n, s.last);
+    if (m < n && left == -right && left != 0) return s.first;
+    return std::abs(right) < std::abs(left) ? n : m;
+}
 
 // Splits strip after strip of lines; what it needs for that is reused.
 template <class T>
@@ -73,9 +90,9 @@ public:
         Segment segment;
         int line, next;
     };
-    // A node to be cut, and the sample of its largest residual, the first of equals.
+    // A node to be cut, and the samples of its largest residual, the first and the last of equals.
     struct Worst {
-        int node, sample;
+        int node, first, last;
     };
 
 private:

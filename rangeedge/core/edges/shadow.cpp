@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "edges/shadow.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "edges/smear.hpp"
+#include "edges/strength.hpp"
+
+namespace rangeedge {
+
+template <class T>
+ShadowStep step_across_shadow(const Line<T>& line, const Fit& f, const Fit& g, int before, int after, bool spaced) {
+    const double x1 = line.abscissa(before), x2 = line.abscissa(after);
+    ShadowStep step;
+    step.before_nearer = f.curve.value(x1) > g.curve.value(x2);
+    const Curve &near = (step.before_nearer ? f : g).curve, &far = (step.before_nearer ? g : f).curve;
+    const double x_near = step.before_nearer ? x1 : x2, x_far = step.before_nearer ? x2 : x1;
+    // The end of the nearer surface, above that of the farther one and above the place to which that runs on.
+    const double end = near.value(x_near), beyond = far.value(x_far), below = far.value(x_near);
+    if (line.frame->projective && !(std::min({end, beyond, below}) > 0)) return {};
+    if (spaced && line.grazing_angle(before, after) > veil) return {};
+    step.jump = std::min(line.depth(beyond), line.depth(below)) - line.depth(end);
+    step.difference = end - std::max(beyond, below);
+    if (!spaced) step.difference = std::min(step.difference, near.value(x_far) - beyond);
+    const FitDeviation deviation =
+        jump_deviation(value_deviation(line, before, f.samples, f.curve.value_variance(x_near)),
+                       value_deviation(line, after, g.samples, g.curve.value_variance(x_near)));
+    step.deviation = deviation.single, step.shared_deviation = deviation.shared;
+    return step;
+}
+
+template ShadowStep step_across_shadow(const Line<float>&, const Fit&, const Fit&, int, int, bool);
+template ShadowStep step_across_shadow(const Line<double>&, const Fit&, const Fit&, int, int, bool);
+
+}  // namespace rangeedge

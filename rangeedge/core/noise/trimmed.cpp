@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "noise/trimmed.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <utility>
+
+#include "base/simd.hpp"
+
+namespace rangeedge {
+namespace {
+
+constexpr double kept_share = 0.75;
+constexpr double kept_deviation = 0.607;      // of a normal variable of deviation 1, within its central 75 %
+constexpr double median_magnitude = 0.67449;   // of that variable
+constexpr double quarter_magnitude = 0.31864;  // the lower quartile of its magnitudes
+constexpr double quarter_excess = 1.5;         // by which the median may exceed what the quartile tells
+constexpr int dropped_bits = 20;              // of a float that its bucket does not tell: 8 buckets an octave are left
+
+// The sum of the squares of values whose bits, as an integer, are below a limit.
+template <int bytes>
+RANGEEDGE_INLINE double squares_below_in(const float* values, std::size_t count, std::int32_t limit) {
+    using D = Doubles<bytes>;
+    using F = Floats<bytes>;
+    D sum = D::all(0);
+    float kept[F::count];
+    for (std::size_t k = 0; k < count; k += F::count) {
+        F v = F::load(values + k);
+        v = from_bits(bits(v) & sign_mask(bits(v) - Ints<bytes>::all(limit)));
+        if (count - k < F::count) v = keep_first(v, static_cast<int>(count - k));
+        v.store(kept);
+        for (int half = 0; half < F::count; half += D::count) {
+            const D d = load_doubles<bytes>(kept + half);
+            sum += d * d;
+        }
+    }
+    return sum.sum();
+}
+RANGEEDGE_VERSIONS(double, squares_below, (const float* values, std::size_t count, std::int32_t limit),
+                   (values, count, limit))
+
+// Magnitudes counted by buckets of their leading bits; within a bucket they are sorted only where a rank falls into it.
+class Histogram {
+public:
+    Histogram(const float* values, std::size_t count) : values_(values), count_(count) {
+        std::size_t k = 0;
+        for (; k + 4 <= count; k += 4)  // apart, since equal values follow each other
+            for (std::size_t i = 0; i < 4; ++i) ++counts_[i][bucket(values[k + i])];
+        for (; k < count; ++k) ++counts_[0][bucket(values[k])];
+        for (std::size_t i = 1; i < 4; ++i)
+            for (std::size_t b = 0; b < buckets; ++b) counts_[0][b] += counts_[i][b];
+    }
+    // The sum of the squares of the smallest, as many as `count` > 0.
+    double squares(std::size_t count) const {
+        std::size_t b = 0, before = 0;
+        while (before + counts_[0][b] < count) before += counts_[0][b++];
+        std::vector<float> within;
+        within.reserve(counts_[0][b]);
+        for (std::size_t k = 0; k < count_; ++k)
+            if (bucket(values_[k]) == b) within.push_back(values_[k]);
+        std::nth_element(within.begin(), within.begin() + static_cast<std::ptrdiff_t>(count - before - 1), within.end());
+        double sum = squares_below(values_, count_, static_cast<std::int32_t>(b << dropped_bits));
+        for (std::size_t k = 0; k < count - before; ++k)
+            sum += static_cast<double>(within[k]) * static_cast<double>(within[k]);
+        return sum;
+    }
+
+private:
+    static constexpr std::size_t buckets = std::size_t{1} << (31 - dropped_bits);
+    static std::size_t bucket(float value) {
+        std::uint32_t bits;
+        std::memcpy(&bits, &value, sizeof bits);
+        return bits >> dropped_bits;
+    }
+
+    const float* values_;
+    std::size_t count_;
+    std::uint32_t counts_[4][buckets] = {};
+};
+
+}  // namespace
+
+double trimmed_deviation(const float* magnitudes, std::size_t count) {
+    const auto kept = static_cast<std::size_t>(kept_share * static_cast<double>(count));
+    if (kept == 0) return 0;
+    return std::sqrt(Histogram(magnitudes, count).squares(kept) / static_cast<double>(kept)) / kept_deviation;
+}
+
+double quartile_deviation(std::vector<float>& magnitudes) {
+    if (magnitudes.empty()) return 0;
+    const auto quarter = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / 4);
+    std::nth_element(magnitudes.begin(), quarter, magnitudes.end());
+    return static_cast<double>(*quarter) / quarter_magnitude;
+}
+
+double median_deviation(std::vector<float>& magnitudes) {
+    if (magnitudes.empty()) return 0;
+    const auto middle = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / 2);
+    std::nth_element(magnitudes.begin(), middle, magnitudes.end());
+    const double by_median = static_cast<double>(*middle) / median_magnitude;
+    return std::min(by_median, quarter_excess * quartile_deviation(magnitudes));
+}
+
+}  // namespace rangeedge
