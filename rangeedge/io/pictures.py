@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 import zlib
+from collections.abc import Iterator
 
 import cv2
 import numpy as np
@@ -27,29 +28,36 @@ def read_png(data: bytes) -> np.ndarray:
     expect_pixels(height, width)
     expect_unpacked(2 * width * height, len(data))
 
+    if not interlaced:
+        (picture,) = _unfiltered(packed, [(height, width)])
+        return picture
     picture = np.empty((height, width), ">u2")
-    passes = [p for part in (_ADAM7 if interlaced else _WHOLE) if (p := picture[part]).size]
-    size = sum(rows * (1 + 2 * cols) for rows, cols in (p.shape for p in passes))
-    filtered = np.frombuffer(inflate(packed, size), np.uint8)
-    expect_at_least(len(filtered), size)
-    at = 0
-    for part in passes:
-        rows, cols = part.shape
-        plain = np.empty((rows, 2 * cols), np.uint8)
-        end = at + rows * (1 + 2 * cols)
-        if not _core.png_unfilter(filtered[at:end], 2, plain):
-            raise ValueError("it is garbled: a row has an unknown filter")
-        part[...] = plain.view(">u2")
-        at = end
+    parts = [part for p in _ADAM7 if (part := picture[p]).size]
+    for part, pixels in zip(parts, _unfiltered(packed, [part.shape for part in parts]), strict=True):
+        part[...] = pixels
     return picture
 
 
-# The pixels of each pass.
-_WHOLE = (np.s_[:, :],)
+# The pixels of each pass of an interlaced picture.
 _ADAM7 = (
     *(np.s_[::8, ::8], np.s_[::8, 4::8], np.s_[4::8, ::4], np.s_[::4, 2::4]),
     *(np.s_[2::4, ::2], np.s_[::2, 1::2], np.s_[1::2, :]),
 )
+
+
+def _unfiltered(packed: bytes, shapes: list[tuple[int, int]]) -> Iterator[np.ndarray]:
+    """Pictures of these shapes, one after the other."""
+    size = sum(rows * (1 + 2 * cols) for rows, cols in shapes)
+    filtered = np.frombuffer(inflate(packed, size), np.uint8)
+    expect_at_least(len(filtered), size)
+    at = 0
+    for rows, cols in shapes:
+        plain = np.empty((rows, 2 * cols), np.uint8)
+        end = at + rows * (1 + 2 * cols)
+        if not _core.png_unfilter(filtered[at:end], 2, plain):
+            raise ValueError("it is garbled: a row has an unknown filter")
+        yield plain.view(">u2")
+        at = end
 
 
 def _png_chunks(data: bytes) -> tuple[int, int, int, int, int, int, int, bytes]:

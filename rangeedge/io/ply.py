@@ -135,8 +135,9 @@ class _PlyBody:
         self.at += end
         values = np.full(element.count, -1.0)
         filled = at >= 0
-        items = data[at[filled, None] + np.arange(item.itemsize)]
-        values[filled] = np.ascontiguousarray(items).view(item)[:, 0]
+        if filled.any():
+            anywhere = np.ndarray(len(data) - item.itemsize + 1, item, self.data, self.at - end, strides=(1,))
+            values[filled] = anywhere[at[filled]]
         return {prop.name: values}
 
     def _firsts(self, element: _Element) -> Iterator[float]:
