@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+import heapq
+import itertools
+import threading
+import time
 from fractions import Fraction
 
 import cv2
@@ -305,6 +310,247 @@ def test_dst_follows_opencv(transform):
         assert not other.any()
 
 
+# Pixels that are not square, rows that wrap around.
+
+
+def brute_lengths(shape, y, x, pixel, wrap):
+    """Squared length from every pixel to (y, x)."""
+    rows, cols = np.mgrid[: shape[0], : shape[1]]
+    aside = np.abs(cols - x)
+    if wrap:
+        aside = np.minimum(aside, shape[1] - aside)
+    return (pixel[0] * aside) ** 2 + (pixel[1] * (rows - y)) ** 2
+
+
+def brute_in_lengths(salience, method, lambda_, pixel, wrap):
+    least = np.full(salience.shape, np.inf)
+    for y, x in np.argwhere(salience):
+        s = salience[y, x] / 255.0
+        squared = brute_lengths(salience.shape, y, x, pixel, wrap)
+        cost = squared / s**2 if method == SALIENCE_MULTIPLICATIVE else squared + lambda_**2 * (1 / s**2 - 1)
+        least = np.minimum(least, cost)
+    return np.sqrt(least)
+
+
+@pytest.mark.parametrize("wrap", [False, True])
+@pytest.mark.parametrize("pixel", [(1.0, 1.0), (0.25, 0.25), (1.0, 2.5), (0.03, 0.002), (100.0, 1.0)])
+def test_pixel_sizes_and_wrapping_equal_brute_force(pixel, wrap):
+    rng = np.random.default_rng(16)
+    options = {"pixelSize": pixel, "wrap": wrap}
+    for density in (0.004, 0.05, 0.5):
+        for shape in ((23, 40), (40, 23), (1, 9), (9, 1), (70, 70)):
+            salience = random_map(rng, shape, density)
+            edges = np.where(salience, 255, 0).astype(np.uint8)
+            exact = brute_in_lengths(edges, SALIENCE_MULTIPLICATIVE, 0, pixel, wrap)
+            np.testing.assert_allclose(distanceTransform(edges, **options), exact, rtol=1e-7)
+            for method in METHODS:
+                exact = brute_in_lengths(salience, method, 4 * pixel[0], pixel, wrap)
+                found, labels = salienceDistanceTransformWithLabels(salience, method, lambda_=4 * pixel[0], **options)
+                np.testing.assert_allclose(found, exact, rtol=1e-6)
+                for (row, col), label in np.ndenumerate(labels[::5, ::7]):
+                    if label >= 0:
+                        one = np.zeros_like(salience)
+                        one.flat[label] = salience.flat[label]
+                        alone = brute_in_lengths(one, method, 4 * pixel[0], pixel, wrap)[5 * row, 7 * col]
+                        assert alone == pytest.approx(exact[5 * row, 7 * col], rel=1e-6)
+
+
+def test_wrapping_by_hand():
+    edges = np.array([[255, 0, 0, 0, 0, 0]], np.uint8)
+    distance, labels = distanceTransformWithLabels(edges, wrap=True)
+    assert distance.tolist() == [[0, 1, 2, 3, 2, 1]]
+    assert not labels.any()
+    two = np.array([[0, 255, 0, 0, 0, 255]], np.uint8)  # column 3 is between both, so are 0 and the way round
+    assert distanceTransformWithLabels(two, wrap=True)[1].tolist() == [[1, 1, 1, 1, 5, 5]]
+
+
+@pytest.mark.parametrize("transform", [distanceTransformWithLabels, salienceDistanceTransformWithLabels])
+def test_wrapped_maps_may_be_rolled(transform):
+    salience = random_map(np.random.default_rng(17), (40, 61), 0.03)
+    distance, _ = transform(salience, wrap=True)
+    for columns in (1, 17, 30, 60):
+        rolled, _ = transform(np.roll(salience, columns, axis=1), wrap=True)
+        np.testing.assert_array_equal(rolled, np.roll(distance, columns, axis=1))
+
+
+def test_a_length_scales_every_distance():
+    salience = random_map(np.random.default_rng(18), (40, 50), 0.05)
+    for method in METHODS:
+        unit = salienceDistanceTransform(salience, method, lambda_=3.0)
+        doubled = salienceDistanceTransform(salience, method, lambda_=6.0, pixelSize=2.0)
+        np.testing.assert_array_equal(doubled, 2 * unit)
+    np.testing.assert_array_equal(distanceTransform(salience, pixelSize=(4, 4)), 4 * distanceTransform(salience))
+
+
+# Barriers.
+
+
+def in_sight(barrier, one, other):
+    """Whether the straight line between two middles crosses no barrier pixel and slips between no two, by fractions."""
+    (y0, x0), (y1, x1) = one, other
+    for y, x in itertools.product(range(min(y0, y1), max(y0, y1) + 1), range(min(x0, x1), max(x0, x1) + 1)):
+        if barrier[y, x]:
+            enter, leave = Fraction(0), Fraction(1)
+            for start, way, cell in ((y0, y1 - y0, y), (x0, x1 - x0, x)):
+                low, high = Fraction(2 * cell - 1, 2) - start, Fraction(2 * cell + 1, 2) - start
+                if way:
+                    enter, leave = max(enter, min(low / way, high / way)), min(leave, max(low / way, high / way))
+                elif not low < 0 < high:
+                    leave = enter
+            if enter < leave:
+                return False
+        through = (2 * (y - y0) + 1) * (x1 - x0) == (2 * (x - x0) + 1) * (y1 - y0)
+        if through and y < max(y0, y1) and x < max(x0, x1):
+            square = barrier[y : y + 2, x : x + 2]
+            if (square[0, 0] and square[1, 1]) or (square[0, 1] and square[1, 0]):
+                return False
+    return True
+
+
+def brute_geodesic(edges, barrier, pixel=(1.0, 1.0)):
+    """Dijkstra over all pairs of pixels in sight of each other."""
+    free = [tuple(p) for p in np.argwhere(barrier == 0)]
+    length = {p: 0.0 if edges[p] else np.inf for p in free}
+    queue = [(0.0, p) for p in free if edges[p]]
+    while queue:
+        so_far, p = heapq.heappop(queue)
+        for q in free:
+            longer = so_far + np.hypot(pixel[0] * (p[1] - q[1]), pixel[1] * (p[0] - q[0]))
+            if longer < length[q] and in_sight(barrier, p, q):
+                length[q] = longer
+                heapq.heappush(queue, (longer, q))
+    result = np.full(edges.shape, np.inf)
+    for p, value in length.items():
+        result[p] = value
+    return result
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_ways_around_barriers_against_brute_force(seed):
+    rng = np.random.default_rng(seed)
+    shape = tuple(rng.integers(3, 12, 2))
+    barrier, edges = rng.random(shape) < rng.choice([0.15, 0.3, 0.45]), rng.random(shape) < 0.06
+    shortest = brute_geodesic(edges, barrier)
+    found, labels = distanceTransformWithLabels(edges, barrier=barrier)
+    reached = np.isfinite(shortest)
+    np.testing.assert_array_equal(np.isfinite(found), reached)
+    np.testing.assert_array_equal(labels >= 0, reached)
+    assert (edges & ~barrier).flat[labels[reached]].all()
+    assert (found[reached] >= shortest[reached] * (1 - 1e-6)).all()
+    assert (found[reached] <= shortest[reached] * 1.0824 + 1e-6).all()
+    close = found[reached] <= shortest[reached] * (1 + 1e-6)
+    assert close.size < 20 or close.mean() > 0.85
+
+
+def test_barrier_by_hand():
+    edges, barrier = np.zeros((5, 7), np.uint8), np.zeros((5, 7), np.uint8)
+    edges[2, 1] = 1
+    barrier[1:4, 3] = 255  # a wall with a way around either end
+    distance = distanceTransform(edges, barrier=barrier)
+    assert np.isposinf(distance[1:4, 3]).all()
+    assert distance[2, 2] == 1
+    assert distance[0, 3] == np.float32(np.sqrt(8))  # in sight, past the corner of the wall
+    assert distance[2, 4] == pytest.approx(np.sqrt(8) + np.sqrt(2) + 1)
+    barrier[:, 3] = 255
+    behind = distanceTransform(edges, barrier=barrier)
+    assert np.isposinf(behind[:, 3:]).all()
+    assert np.isfinite(behind[:, :3]).all()
+    assert np.isfinite(distanceTransform(edges, barrier=barrier, wrap=True)[:, 4:]).all()
+
+
+def test_no_way_leads_through_a_diagonal_line():
+    edges, barrier = np.zeros((9, 9), np.uint8), np.eye(9, dtype=bool)
+    edges[0, 8] = 1
+    distance = distanceTransform(edges, barrier=barrier)
+    assert np.isposinf(distance[np.tril_indices(9)]).all()
+    assert np.isfinite(distance[np.triu_indices(9, 1)]).all()
+
+
+def test_without_barrier_pixels_ways_are_straight(monkeypatch):
+    monkeypatch.setattr("rangeedge.distance._WORTH_THREADS", 0)
+    edges = random_map(np.random.default_rng(19), (60, 80), 0.01, levels=1)
+    for options in ({}, {"wrap": True}, {"pixelSize": (1.0, 3.0)}):
+        expected = distanceTransformWithLabels(edges, **options)
+        assert_same(distanceTransformWithLabels(edges, barrier=np.zeros_like(edges), **options), expected)
+
+
+def test_barriers_at_every_thread_count(monkeypatch):
+    monkeypatch.setattr("rangeedge.distance._WORTH_THREADS", 0)
+    rng = np.random.default_rng(20)
+    edges, barrier = rng.random((90, 70)) < 0.003, rng.random((90, 70)) < 0.3
+    results = []
+    for threads in (1, 2, 3, 8):
+        monkeypatch.setattr(cv2, "getNumThreads", lambda threads=threads: threads)
+        results.append(distanceTransformWithLabels(edges, barrier=barrier, wrap=True, pixelSize=(1.0, 0.5)))
+    for result in results[1:]:
+        assert_same(result, results[0])
+
+
+# Awkward inputs.
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_any_layout_of_a_salience_map(method):
+    salience = random_map(np.random.default_rng(21), (30, 40), 0.1)
+    strength = salience.astype(np.float32) / 256
+    expected = salienceDistanceTransform(strength, method)
+    unaligned = np.frombuffer(b"\0" + strength.tobytes(), np.uint8)[1:].view(np.float32).reshape(strength.shape)
+    assert not unaligned.flags.aligned
+    for same in (unaligned, np.asfortranarray(strength), np.repeat(strength, 2, axis=1)[:, ::2]):
+        np.testing.assert_array_equal(salienceDistanceTransform(same, method), expected)
+    full = salience > 0
+    np.testing.assert_array_equal(
+        salienceDistanceTransform(full.T, method), salienceDistanceTransform(np.ascontiguousarray(full.T), method)
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32])
+def test_a_map_that_another_thread_writes_to(method, dtype):
+    """Any answer will do, and none may read beyond an array."""
+    salience = np.full((200, 220), 1, dtype)
+    stop = threading.Event()
+
+    def write():
+        values = itertools.cycle([0, 1] if dtype == np.uint8 else [np.nan, 0.5, 0, 1e-9])
+        while not stop.is_set():
+            salience[:] = next(values)
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        end = time.monotonic() + 0.5
+        while time.monotonic() < end:
+            with contextlib.suppress(rangeedge.error):  # of NaN
+                salienceDistanceTransform(salience, method)
+    finally:
+        stop.set()
+        writer.join()
+
+
+@pytest.mark.parametrize("shape", ["ramp", "cone"])
+def test_time_is_bounded_where_salience_rises_steadily(shape):
+    """Far sources are the stronger ones there, so that nearly all of them compete."""
+
+    def worst(side):
+        y, x = np.mgrid[:side, :side]
+        if shape == "ramp":
+            return np.where(x < side / 4, 1 - x / side, 0).astype(np.float32)
+        radius = np.hypot(y - side / 2, x - side / 2)
+        return np.where(radius < 0.3 * side, 0, radius / radius.max()).astype(np.float32)
+
+    def seconds(salience):
+        def once():
+            start = time.process_time()
+            salienceDistanceTransform(salience)
+            return time.process_time() - start
+
+        return min(once() for _ in range(3))
+
+    dense = np.random.default_rng(22).random((640, 640), np.float32)
+    assert seconds(worst(640)) < 10 * seconds(dense)
+
+
 @pytest.mark.parametrize("transform", [*TRANSFORMS, distanceTransformWithLabels, salienceDistanceTransformWithLabels])
 @pytest.mark.parametrize(
     "bad",
@@ -357,3 +603,26 @@ def test_bad_dst(transform):
     for dst in (locked, [[0.0, 0.0]]):
         with pytest.raises(rangeedge.error, match="dst"):
             transform(edges, dst=dst)
+
+
+EVERY = [*TRANSFORMS, distanceTransformWithLabels, salienceDistanceTransformWithLabels]
+
+
+@pytest.mark.parametrize("transform", EVERY)
+@pytest.mark.parametrize("size", [0, -1.0, (1, 0), (1, 2, 3), np.inf, np.nan, "1", (1.0, 101.0), 1e31])
+def test_bad_pixel_size(transform, size):
+    with pytest.raises(rangeedge.error, match=rf"{transform.__name__}:.*`pixelSize`"):
+        transform(np.zeros((2, 2), np.uint8), pixelSize=size)
+
+
+@pytest.mark.parametrize("transform", EVERY)
+def test_bad_wrap(transform):
+    with pytest.raises(rangeedge.error, match=rf"{transform.__name__}:.*`wrap`"):
+        transform(np.zeros((2, 2), np.uint8), wrap=1)
+
+
+@pytest.mark.parametrize("transform", [distanceTransform, distanceTransformWithLabels])
+@pytest.mark.parametrize("barrier", [np.zeros((2, 3), np.uint8), np.zeros((2, 2)), [[0, 1], [0, 0]]])
+def test_bad_barrier(transform, barrier):
+    with pytest.raises(rangeedge.error, match=rf"{transform.__name__}:.*`barrier`"):
+        transform(np.zeros((2, 2), np.uint8), barrier=barrier)

@@ -119,6 +119,16 @@ void parallel_for(int count, Team& team, F&& body) {
     });
 }
 
+// Calls body(i, thread) for every i in [0, count); a thread that is done with one takes the next. For loops whose steps
+// differ in cost.
+template <class F>
+void parallel_each(int count, Team& team, F&& body) {
+    std::atomic<int> next{0};
+    team.run([&](int thread) {
+        for (int i = next++; i < count; i = next++) body(i, thread);
+    });
+}
+
 template <class F>
 void parallel_for(int count, int threads, F&& body) {
     Team team(std::min(count, threads));
