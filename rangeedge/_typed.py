@@ -295,8 +295,8 @@ class Accessors:
         """getMaxSmear() -> retval
 
         Most pixels of a scan line over which a step may be smeared, as interpolation and the footprint of a pixel do,
-        to be one jump between the surfaces on either side. More than two are a surface of their own unless it is almost
-        parallel to the viewing direction. 0 takes every pixel for a surface.
+        to be one jump between the surfaces on either side. They are a surface of their own unless that is steep, or if
+        more than two almost parallel to the viewing direction. 0 takes every pixel for a surface.
         """
         return self._params.maxSmear
 
@@ -304,8 +304,8 @@ class Accessors:
         """setMaxSmear(maxSmear) -> None
 
         Most pixels of a scan line over which a step may be smeared, as interpolation and the footprint of a pixel do,
-        to be one jump between the surfaces on either side. More than two are a surface of their own unless it is almost
-        parallel to the viewing direction. 0 takes every pixel for a surface.
+        to be one jump between the surfaces on either side. They are a surface of their own unless that is steep, or if
+        more than two almost parallel to the viewing direction. 0 takes every pixel for a surface.
         """
         self._set("maxSmear", maxSmear)
 

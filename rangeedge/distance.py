@@ -71,6 +71,8 @@ def distanceTransform(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import distanceTransform
     >>> edges = np.array([[255, 0, 0, 0]], np.uint8)
     >>> distanceTransform(edges)
     array([[0., 1., 2., 3.]], dtype=float32)
@@ -113,6 +115,8 @@ def distanceTransformWithLabels(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import distanceTransformWithLabels
     >>> edges = np.array([[255, 0, 0, 0, 255]], np.uint8)
     >>> distanceTransformWithLabels(edges)[1]
     array([[0, 0, 0, 4, 4]], dtype=int32)
@@ -181,6 +185,8 @@ def salienceDistanceTransform(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import salienceDistanceTransform
     >>> salience = np.array([[51, 0, 0, 0, 0, 0, 0, 255]], np.uint8)
     >>> salienceDistanceTransform(salience)
     array([[0., 5., 5., 4., 3., 2., 1., 0.]], dtype=float32)
@@ -224,6 +230,8 @@ def salienceDistanceTransformWithLabels(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from rangeedge import salienceDistanceTransformWithLabels
     >>> salience = np.array([[51, 0, 0, 0, 0, 0, 0, 255]], np.uint8)
     >>> salienceDistanceTransformWithLabels(salience)[1]
     array([[0, 0, 7, 7, 7, 7, 7, 7]], dtype=int32)
