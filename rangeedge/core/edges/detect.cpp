@@ -133,7 +133,9 @@ private:
         bool jumps = jump > 0 && is_jump(line, edge.before, edge.after, difference, difference / of_jump.single);
         if (jumps && is_smooth(line, edge.before, edge.after, steps, difference))
             jump = jump_significance = 0, jumps = false;
-        if (jumps) crease = crease_significance = 0;
+        const double step = (line.abscissa(edge.after) - line.abscissa(edge.before)) / (edge.after - edge.before);
+        if (jumps || bends_smoothly(line, edge.before, edge.after, std::abs(f1.slope - f2.slope) * step))
+            crease = crease_significance = 0;
 
         Candidate c{};
         c.jump = within_range(jump);

@@ -91,21 +91,35 @@ double largest_jump(const Line<T>& line, const Curve& f1, const Curve& f2, int b
            std::abs(z2 - line.depth(f2.value(x2 + way)));
 }
 
-// Whether the samples from `before` to `after` and two on either side run on too smoothly for a step of that size, which
-// curves that do not quite follow them pretend; not where one of them has no data. A sharp step has third differences of twice its size, an even ramp over n
-// samples of step / 2n.
+// The largest third difference of the samples from `before` to `after` and `margin` on either side; infinite where one of
+// them has no data, or they are too few.
 template <class T>
-bool is_smooth(const Line<T>& line, int before, int after, int n, double step) {
-    const int first = std::max(before - 2, 0), last = std::min(after + 2, line.path.size - 1);
-    const bool whole = last - first == after - before + 4;  // else half of them are to be seen
+double largest_third_difference(const Line<T>& line, int before, int after, int margin) {
+    const int first = std::max(before - margin, 0), last = std::min(after + margin, line.path.size - 1);
+    if (last - first < 3) return HUGE_VAL;
     double largest = 0;
     for (int k = first; k + 3 <= last; ++k) {
         const double slopes = line.ordinate(k + 2) - line.ordinate(k + 1);
-        const double third = line.ordinate(k + 3) - 3 * slopes - line.ordinate(k);
-        if (!(std::abs(third) <= HUGE_VAL)) return false;  // no data
-        largest = std::max(largest, std::abs(third));
+        const double third = std::abs(line.ordinate(k + 3) - 3 * slopes - line.ordinate(k));
+        if (!(third <= HUGE_VAL)) return HUGE_VAL;
+        largest = std::max(largest, third);
     }
-    return last - first >= 3 && largest < (whole ? 1 : 0.5) * step / (2.5 * n - 1.5);
+    return largest;
+}
+
+// Whether samples run on too smoothly for a step of that size, which curves that do not quite follow them pretend. A
+// sharp step has third differences of twice its size, an even ramp over n samples of step / 2n.
+template <class T>
+bool is_smooth(const Line<T>& line, int before, int after, int n, double step) {
+    return largest_third_difference(line, before, after, 2) < step / (2.5 * n - 1.5);
+}
+
+// The same for a change of slope, from one sample to the next. A sharp one has a third difference of at least half its
+// size, one that is spread evenly over n samples of 1 / n.
+template <class T>
+bool bends_smoothly(const Line<T>& line, int before, int after, double slope) {
+    constexpr int reach = 4, most_samples = 8;
+    return largest_third_difference(line, before, after, reach) * most_samples < slope;
 }
 
 // The angle between the normals, in degrees: that between the tangents.

@@ -26,6 +26,9 @@ constexpr std::size_t least_windows = 40;  // that tell a deviation
 constexpr std::size_t depth_bins = 12;
 constexpr double most_growth = 1.41;       // of a factor from n to 2 n, beyond what is measured
 constexpr double smooth_growth = 5.66;     // the same of waves without an end, 2^2.5: more than that is no noise
+// Of factors on slopes, at the most, where single values are noisy: waves of eight times their deviation.
+constexpr double most_slope[FitFactors::levels] = {6, 14, 24, 36, 45};
+const double most_shared = std::sqrt(static_cast<double>(neighbours));  // over factors of one line: all err alike
 constexpr double value_per_slope = 0.5;    // of factors, at the least: a wrong slope makes the value at the end wrong
 constexpr double least_factor = 0.5;       // errors that cancel each other are not relied on
 constexpr double median_magnitude = 0.67449;  // of a normal variable, where a median of deviations is looked for
@@ -129,7 +132,9 @@ public:
             const double size = std::abs(s.*number) / sigma(s, n);
             if (std::isfinite(size)) sizes_.push_back(static_cast<float>(size));
         }
-        return sizes_.size() < least_windows ? std::nan("") : median_deviation(sizes_);
+        if (sizes_.size() < least_windows) return std::nan("");
+        // Short fits to quantised values are often exact.
+        return n < 8 ? median_deviation(sizes_) : normal_deviation(sizes_);
     }
 
 private:
@@ -279,7 +284,7 @@ Deviation waves_of(const std::vector<DirectionSteps>& found, bool projective, co
         const std::size_t begin = bin * steps.size() / depth_bins, end = (bin + 1) * steps.size() / depth_bins;
         sizes.clear();
         for (std::size_t i = begin; i < end; ++i) sizes.push_back(static_cast<float>(std::abs(steps[i].slope)));
-        const double z = 1 / steps[(begin + end) / 2].ordinate, deviation = median_deviation(sizes) * z * z;
+        const double z = 1 / steps[(begin + end) / 2].ordinate, deviation = normal_deviation(sizes) * z * z;
         if (!(deviation > 0) || !std::isfinite(deviation)) continue;
         depths.push_back(z);
         deviations.push_back(deviation);
@@ -307,7 +312,7 @@ void write_factors(const double* measured, double* factors) {
     }
 }
 
-void write_fit_noise(const DirectionSteps& found, Measure& measure, double* numbers) {
+void write_fit_noise(const DirectionSteps& found, Measure& measure, bool silent, double* numbers) {
     double measured[4][measured_levels];
     for (int level = 0; level < measured_levels; ++level) {
         const int n = 4 << level;
@@ -321,9 +326,10 @@ void write_fit_noise(const DirectionSteps& found, Measure& measure, double* numb
     for (int level = 0; level < FitFactors::levels; ++level) {
         double *slope = numbers + level, *value = slope + FitFactors::levels;
         double *shared_slope = value + FitFactors::levels, *shared_value = shared_slope + FitFactors::levels;
-        *value = std::max(*value, value_per_slope * *slope);
-        *shared_slope = std::max(*shared_slope, *slope);
-        *shared_value = std::max({*shared_value, *value, value_per_slope * *shared_slope});
+        if (!silent) *slope = std::min(*slope, most_slope[level]);
+        *value = std::min(std::max(*value, value_per_slope * *slope), *slope);
+        *shared_slope = std::max(std::min(*shared_slope, most_shared * *slope), *slope);
+        *shared_value = std::max({std::min(*shared_value, most_shared * *value), *value, value_per_slope * *shared_slope});
     }
     const double residual = residual_factor * median_magnitude * measure.factor(found.residuals, &Step::gap, longest);
     numbers[4 * FitFactors::levels] = residual >= 1 ? std::min(residual, most_residual * numbers[0]) : 1;
@@ -346,7 +352,7 @@ FitNoiseEstimate fit_noise(const T* ordinate, int rows, int cols, bool projectiv
     estimate.waves = waves_of(found, projective, single);
     parallel_for(2, team, [&](int begin, int end, int) {
         Measure measure(single, estimate.waves, projective);
-        for (int i = begin; i < end; ++i) write_fit_noise(found[static_cast<std::size_t>(i)], measure, i == 0 ? estimate.rows : estimate.cols);
+        for (int i = begin; i < end; ++i) write_fit_noise(found[static_cast<std::size_t>(i)], measure, silent, i == 0 ? estimate.rows : estimate.cols);
     });
     return estimate;
 }

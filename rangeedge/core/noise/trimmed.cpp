@@ -16,7 +16,7 @@ constexpr double kept_share = 0.75;
 constexpr double kept_deviation = 0.607;      // of a normal variable of deviation 1, within its central 75 %
 constexpr double median_magnitude = 0.67449;   // of that variable
 constexpr double quarter_magnitude = 0.31864;  // the lower quartile of its magnitudes
-constexpr double quarter_excess = 1.5;         // by which the median may exceed what the quartile tells
+constexpr double tenth_magnitude = 0.12566;    // and their lowest tenth
 constexpr int dropped_bits = 20;              // of a float that its bucket does not tell: 8 buckets an octave are left
 
 // The sum of the squares of values whose bits, as an integer, are below a limit.
@@ -80,6 +80,14 @@ private:
     std::uint32_t counts_[4][buckets] = {};
 };
 
+// By the magnitude that one in `share` does not reach, which is `normal` for a variable of deviation 1.
+double quantile_deviation(std::vector<float>& magnitudes, std::size_t share, double normal) {
+    if (magnitudes.empty()) return 0;
+    const auto place = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / share);
+    std::nth_element(magnitudes.begin(), place, magnitudes.end());
+    return static_cast<double>(*place) / normal;
+}
+
 }  // namespace
 
 double trimmed_deviation(const float* magnitudes, std::size_t count) {
@@ -89,18 +97,16 @@ double trimmed_deviation(const float* magnitudes, std::size_t count) {
 }
 
 double quartile_deviation(std::vector<float>& magnitudes) {
-    if (magnitudes.empty()) return 0;
-    const auto quarter = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / 4);
-    std::nth_element(magnitudes.begin(), quarter, magnitudes.end());
-    return static_cast<double>(*quarter) / quarter_magnitude;
+    return quantile_deviation(magnitudes, 4, quarter_magnitude);
 }
 
 double median_deviation(std::vector<float>& magnitudes) {
-    if (magnitudes.empty()) return 0;
-    const auto middle = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / 2);
-    std::nth_element(magnitudes.begin(), middle, magnitudes.end());
-    const double by_median = static_cast<double>(*middle) / median_magnitude;
-    return std::min(by_median, quarter_excess * quartile_deviation(magnitudes));
+    return quantile_deviation(magnitudes, 2, median_magnitude);
+}
+
+double normal_deviation(std::vector<float>& magnitudes) {
+    return std::min({median_deviation(magnitudes), quartile_deviation(magnitudes),
+                     quantile_deviation(magnitudes, 10, tenth_magnitude)});
 }
 
 }  // namespace rangeedge

@@ -10,11 +10,12 @@ namespace rangeedge {
 // corrected for the trimming. 0 of none. `padding` more values than `count` may be read.
 double trimmed_deviation(const float* magnitudes, std::size_t count);
 
-// The same by the lower quartile of the magnitudes, which are put in another order.
+// The same by the lower quartile, or the median, of the magnitudes, which are put in another order.
 double quartile_deviation(std::vector<float>& magnitudes);
-
-// The same by the median of the magnitudes, which are put in another order; for a few thousand. Less where many small
-// ones are far smaller than those of normal values would be: then the median itself is one of the outliers.
 double median_deviation(std::vector<float>& magnitudes);
+
+// The largest deviation of normal values that agrees with the median, the quartile and the tenth of the magnitudes. Those
+// of noise agree; where half of the values are outliers, the smaller ones still tell the deviation of the rest.
+double normal_deviation(std::vector<float>& magnitudes);
 
 }  // namespace rangeedge
