@@ -42,7 +42,7 @@ Deviation of_depths(const SingleNoise& found, double rounding) {
 
 template <class T>
 NoiseEstimate estimate_noise(const T* ordinate, int rows, int cols, bool projective, double step, int threads) {
-    const SingleNoise found = single_noise(ordinate, rows, cols, threads);
+    const SingleNoise found = single_noise(ordinate, rows, cols, projective, threads);
     const double rounding = step / std::sqrt(12.0);
     NoiseEstimate estimate;
     estimate.single = projective ? of_depths(found, rounding) : of_heights(found, rounding);

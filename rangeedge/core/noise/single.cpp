@@ -21,6 +21,7 @@ constexpr std::size_t most_bins = 8;
 constexpr std::size_t least_bin = 50;      // windows
 constexpr double quantised_share = 0.3;    // of windows with equal neighbours: more have values with a step
 constexpr std::size_t ranked_windows = 4096;  // that tell the borders of bins
+constexpr double coarsest_step = 5e-3;
 const double per_difference = std::sqrt(20.0);  // deviation of a third difference of independent values
 
 // Of windows of four samples: the magnitude of the third difference, the mean ordinate, and the least difference of
@@ -79,19 +80,21 @@ Windows windows_of(const T* ordinate, std::ptrdiff_t rows, std::ptrdiff_t cols, 
 }
 
 // The deviation of rounding to the step that quantised values show; 0 of others.
-double rounding_deviation(const float* steps, std::size_t count) {
+double rounding_deviation(const float* steps, std::size_t count, double coarsest) {
     std::vector<float> equal;
     for (std::size_t k = 0; k < count; ++k)
         if (steps[k] > 0) equal.push_back(steps[k]);
     if (equal.empty() || static_cast<double>(equal.size()) < quantised_share * static_cast<double>(count)) return 0;
     const auto middle = equal.begin() + static_cast<std::ptrdiff_t>(equal.size() / 2);
     std::nth_element(equal.begin(), middle, equal.end());
-    return static_cast<double>(*middle) / std::sqrt(12.0);
+    const auto step = static_cast<double>(*middle);
+    return step <= coarsest ? step / std::sqrt(12.0) : 0;
 }
 
 // The deviation that third differences show, not below that of rounding.
-double deviation_of(const float* differences, const float* steps, std::size_t count) {
-    return std::max(trimmed_deviation(differences, count) / per_difference, rounding_deviation(steps, count));
+double deviation_of(const float* differences, const float* steps, std::size_t count, double coarsest) {
+    const double rounding = rounding_deviation(steps, count, coarsest);
+    return std::max(trimmed_deviation(differences, count) / per_difference, rounding);
 }
 
 // The windows of one range of ordinates.
@@ -122,7 +125,7 @@ std::vector<Bin> bins_of(const Windows& windows) {
 }  // namespace
 
 template <class T>
-SingleNoise single_noise(const T* ordinate, int rows, int cols, int threads) {
+SingleNoise single_noise(const T* ordinate, int rows, int cols, bool projective, int threads) {
     SingleNoise result;
     Windows windows;
     for (int apart = 1; apart <= farthest && windows.count < fewest_windows; ++apart) {
@@ -133,6 +136,11 @@ SingleNoise single_noise(const T* ordinate, int rows, int cols, int threads) {
     const auto seen = windows.ordinates.begin();
     const auto [low, high] = std::minmax_element(seen, seen + static_cast<std::ptrdiff_t>(windows.count));
     result.lowest = static_cast<double>(*low), result.highest = static_cast<double>(*high);
+    // Of values that were rounded, at the most: a share of the distance, or of the range of heights.
+    const auto coarsest = [&](double ordinate_there) {
+        return coarsest_step * (projective ? std::abs(ordinate_there) : result.highest - result.lowest);
+    };
+    const double coarsest_of_all = coarsest((result.lowest + result.highest) / 2);
     std::vector<Bin> bins = bins_of(windows);
     bins.erase(std::remove_if(bins.begin(), bins.end(), [](const Bin& b) { return b.steps.size() < 2; }), bins.end());
     result.ordinates.resize(bins.size());
@@ -142,24 +150,25 @@ SingleNoise single_noise(const T* ordinate, int rows, int cols, int threads) {
     team.run([&](int) {
         for (std::size_t i; (i = taken++) <= bins.size();) {
             if (i == 0) {
-                result.deviation = deviation_of(windows.differences.data(), windows.steps.data(), windows.count);
+                result.deviation = deviation_of(windows.differences.data(), windows.steps.data(), windows.count, coarsest_of_all);
                 std::vector<float> sizes(windows.differences);
                 sizes.resize(windows.count);
                 result.quiet = std::max(quartile_deviation(sizes) / per_difference,
-                                        rounding_deviation(windows.steps.data(), windows.count));
+                                        rounding_deviation(windows.steps.data(), windows.count, coarsest_of_all));
                 continue;
             }
             Bin& bin = bins[i - 1];
             const std::size_t count = bin.steps.size();
             bin.differences.resize(count + padding);
             result.ordinates[i - 1] = bin.sum / static_cast<double>(count);
-            result.deviations[i - 1] = deviation_of(bin.differences.data(), bin.steps.data(), count);
+            result.deviations[i - 1] =
+                deviation_of(bin.differences.data(), bin.steps.data(), count, coarsest(result.ordinates[i - 1]));
         }
     });
     return result;
 }
 
-template SingleNoise single_noise(const float*, int, int, int);
-template SingleNoise single_noise(const double*, int, int, int);
+template SingleNoise single_noise(const float*, int, int, bool, int);
+template SingleNoise single_noise(const double*, int, int, bool, int);
 
 }  // namespace rangeedge

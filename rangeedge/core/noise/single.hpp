@@ -6,9 +6,10 @@
 // are few among them, so that the smaller three quarters count (trimmed.hpp).
 //
 // Eight equal values in a row say nothing of the noise: they belong to filled holes, a saturated or a simulated
-// background. The four in their middle do not count. Where values are whole multiples of a step, many neighbours are equal that belong to a slope; then the step,
-// the least difference other than zero, bounds the deviation by that of rounding, step / sqrt(12). Where no four
-// neighbours have data, as on a chequered mask, samples two, three or four apart are taken for neighbours.
+// background. The four in their middle do not count. Where values are whole multiples of a step, many neighbours are
+// equal that belong to a slope; then the step, the least difference other than zero, bounds the deviation by that of
+// rounding, step / sqrt(12), unless it is so large that it must be one of the scene, as those of stairs are. Where no
+// four neighbours have data, as on a chequered mask, samples two, three or four apart are taken for neighbours.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <vector>
@@ -26,6 +27,6 @@ struct SingleNoise {
 
 // Of an image with NaN where there is no data.
 template <class T>
-SingleNoise single_noise(const T* ordinate, int rows, int cols, int threads);
+SingleNoise single_noise(const T* ordinate, int rows, int cols, bool projective, int threads);
 
 }  // namespace rangeedge
