@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from ._check import error, named, number, public
+from ._check import described, error, fail, named, number, public
 
 _LEVELS = (4, 8, 16, 32, 64)  # numbers of samples of a fit for which its noise is given
 _NEIGHBOURS = 5  # scan lines that are looked at together
@@ -79,9 +80,12 @@ class NoiseModel:
             raise error("one of `a`, `b`, `c` must differ from 0")
         if self.fits is None:
             return
+        what = f"the {len(WHITE)} numbers of a model of `estimateNoise`"
+        if not isinstance(self.fits, Sequence) or len(self.fits) != len(WHITE):
+            raise fail("fits", what, described(self.fits))
         object.__setattr__(self, "fits", tuple(number("fits", value, 0) for value in self.fits))
-        if len(self.fits) != len(WHITE) or min(self.fits[4:]) == 0 or not any(self.fits[:4]):
-            raise error(f"`fits` must be the {len(WHITE)} numbers of a model of `estimateNoise`, got {len(self.fits)}")
+        if min(self.fits[4:]) == 0 or not any(self.fits[:4]):
+            raise fail("fits", what, "zeros")
 
     def __repr__(self) -> str:
         defaults = vars(NoiseModel(1.0)) | {"a": 0.0}
@@ -96,6 +100,18 @@ class NoiseModel:
         if self.fits is not None:
             return self.fits
         return (self.a, self.b, self.c, 0.0, *(_direction(self.correlation, self.length) * 2))
+
+    @classmethod
+    def realsense(cls) -> NoiseModel:
+        return cls(c=1e-3, correlation=5, length=8)
+
+    @classmethod
+    def azureKinect(cls) -> NoiseModel:
+        return cls(a=1e-3, correlation=5, length=8)
+
+    @classmethod
+    def structuredLight(cls) -> NoiseModel:
+        return cls(a=1e-3)
 
     @classmethod
     def kinect1(cls) -> NoiseModel:

@@ -33,10 +33,10 @@ from rangeedge import (
 
 # What the kernels fix and no parameter sets.
 REFINEMENTS = ("merged", "dissolved")  # of least-squares approximations, in this order
-CURVED_SIGNIFICANCE = 5.0  # of the quadratic term
+CURVED_SIGNIFICANCE = 6.0  # of the quadratic term
 STRADDLING = 2.0  # how much more, in significance, a segment across an edge may cost
 LONE_SIGNIFICANCE = 3.0
-JUMP_TOLERANCES, JUMP_ALONE = 2.0, 12.0
+JUMP_TOLERANCES, JUMP_ALONE = 2.0, 8.0
 REACH, CAPPED, LONE_SHARE = 4.0, 8.0, 1 / 3  # pixels; standard deviations
 LEAST_SLOPE = 0.3
 LEAST_SPREAD, LEAST_DIRECTIONS = 0.05, (0.02, 1e-9)
@@ -47,6 +47,41 @@ PARALLEL = 1e-14  # what rounding makes of parallel tangents here
 
 STEPS = {DIR_ROWS: (1, 0), DIR_COLS: (0, 1), DIR_DIAG45: (1, -1), DIR_DIAG135: (1, 1)}  # (dx, dy)
 KINDS = EDGE_JUMP | EDGE_CONVEX | EDGE_CONCAVE
+
+
+# The noise of fits to n samples (core/image/noise.hpp).
+
+
+@dataclass
+class FitNoise:
+    """Along one direction, in units of what white noise would do to slopes, values and residuals.
+
+    Factors are given at n = 4, 8, 16, 32, 64, and linear in log n from 1 at n = 2 up to there.
+    """
+
+    slope: np.ndarray
+    value: np.ndarray
+    shared_slope: np.ndarray  # of neighbouring lines together, in units of one line
+    shared_value: np.ndarray
+    residual: float
+
+    @classmethod
+    def of(cls, numbers):
+        return cls(*np.reshape(numbers[:-1], (4, -1)), numbers[-1])
+
+    def factor(self, name, n):
+        return float(np.interp(math.log2(max(n, 1)), [1, 2, 3, 4, 5, 6], [1, *getattr(self, name)]))
+
+
+def along(direction, model):
+    """The noise of fits along a direction, diagonals being between rows and columns."""
+    rows, cols = np.reshape(model.of_fits()[4:], (2, -1))
+    return FitNoise.of({DIR_ROWS: rows, DIR_COLS: cols}.get(direction, np.sqrt(rows * cols)))
+
+
+def wave_share(n):
+    """How much of the noise of a fit to n samples is waves, the rest being that of single samples."""
+    return float(np.interp(n, [2, 4, 8, 16], [0, 0.4, 0.7, 1]))
 
 
 # Splitting (paper, 4.1).
@@ -144,16 +179,17 @@ def fitted(x, y, degree):
     coefficients = np.linalg.solve(r, q.T @ (y - base))
     inverse = np.linalg.inv(r)
     residuals = (y - base) - a @ coefficients
-    return Curve(origin, unit, base, coefficients, inverse @ inverse.T, float(residuals @ residuals))
+    sum_squares = float(residuals @ residuals) if len(x) > degree + 1 else 0.0  # exactly: ties hang on it
+    return Curve(origin, unit, base, coefficients, inverse @ inverse.T, sum_squares)
 
 
-def least_squares(x, y, sigma):
-    """A line, or a quadratic where that is significant."""
+def least_squares(x, y, deviation):
+    """A line, or a quadratic where its term is significant, at this deviation of the samples from it."""
     line = fitted(x, y, min(1, len(x) - 1))
     if len(x) <= 3:
         return line
     curve = fitted(x, y, 2)
-    significance = abs(curve.coefficients[2]) / (sigma * math.sqrt(curve.covariance[2, 2]))
+    significance = abs(curve.coefficients[2]) / (deviation * math.sqrt(curve.covariance[2, 2]))
     return curve if significance > CURVED_SIGNIFICANCE else line
 
 
@@ -179,10 +215,26 @@ class Line:
     projective: bool
     x: np.ndarray
     y: np.ndarray
-    sigma: np.ndarray  # of the ordinates
+    sigma: np.ndarray  # of the ordinates, as neighbours tell it
+    waves: np.ndarray  # of the ordinates, in fits to many samples
+    noise: FitNoise
     tolerance: np.ndarray
     scale: np.ndarray | None  # inverse tolerances, where they differ
     place: Any = None  # abscissa to the position (X, Y) in the plane of the image
+
+    def deviation(self, k, n):
+        """Of the samples around k, as a fit to n of them counts with it."""
+        return self.sigma[k] + wave_share(n) * (self.waves[k] - self.sigma[k])
+
+    def deviation_from_quadratic(self, k, n):
+        """The same, as the quadratic term counts with it: the difference of the slopes of two halves."""
+        return self.noise.factor("slope", n // 2) * self.deviation(k, n)
+
+    def fit(self, first, last, k=None):
+        """Least squares over samples, with the noise at sample k: the one in their middle, the right one of two."""
+        n = last - first + 1
+        deviation = self.deviation_from_quadratic(first + n // 2 if k is None else k, n)
+        return least_squares(*(np.asarray(v[first : last + 1], np.float64) for v in (self.x, self.y)), deviation)
 
     def tangent(self, x, value, slope):
         """Derivative by the abscissa of a curve in space, the ray to its point, and how the ray moves."""
@@ -269,29 +321,26 @@ class Image:
         else:
             x, y, place = self._grid(pixels)
         ordinate = np.asarray(y, np.float64)
-        depth = 1 / ordinate if self.projective else np.abs(ordinate)
-        to_ordinate = ordinate**2 if self.projective else np.ones_like(ordinate)
-        sigma = np.maximum(self.noise.correlation * self.noise(depth) * to_ordinate, SMALLEST)
-        scale = self._inverse_tolerances(y)
-        tolerance = 1 / scale.astype(np.float64)
-        n = self.noise
-        scaled = n.b != 0 or (n.a if self.projective else n.c) != 0
-        if self.params.eps is not None:
-            scaled = self.projective
-        elif not scaled:
-            tolerance = self.params.epsFactor * sigma
-        if not scaled and self.params.eps is not None:
-            tolerance = np.full(len(y), self.params.eps)
-        return Line(pixels, direction, self.projective, x, y, sigma, tolerance, scale if scaled else None, place)
+        noise, waves = along(direction, self.noise), self.noise.of_fits()[:4]
+        sigma = self._of_ordinate((self.noise.a, self.noise.b, self.noise.c, 0.0), ordinate)
+        factor = self.params.epsFactor * noise.residual
+        c = [factor * w for w in waves] if self.params.eps is None else [self.params.eps, 0.0, 0.0, 0.0]
+        of_tolerance = self._of_ordinate(c, y)
+        # The same everywhere: a length on a grid, or one that grows with the square of the depth.
+        even = c[1] == c[3] == (c[0] if self.projective else c[2]) == 0
+        scale = None if even else 1 / of_tolerance
+        tolerance = np.full(len(y), max(c[2 if self.projective else 0], SMALLEST)) if even else 1 / np.float64(scale)
+        waves = self._of_ordinate(waves, ordinate)
+        return Line(pixels, direction, self.projective, x, y, sigma, waves, noise, tolerance, scale, place)
 
-    def _inverse_tolerances(self, y):
-        """In the precision of the image; of noise as a polynomial: sigma(1 / q) q^2 = a q^2 + b q + c."""
-        n, eps, real = self.noise, self.params.eps, y.dtype.type
-        factor = real(self.params.epsFactor * n.correlation if eps is None else eps)
-        a, b, c = (factor * real(v) for v in ((n.a, n.b, n.c) if eps is None else (1.0, 0.0, 0.0)))
-        y = y if self.projective else abs(y)
-        tolerance = (a * y + b) * y + c if self.projective else a + (b + c * y) * y
-        return 1 / np.where(tolerance > real(SMALLEST), tolerance, real(SMALLEST))
+    def _of_ordinate(self, coefficients, y):
+        """The deviation c0 + c1 z + c2 z^2 + c3 z^3 of lengths z, at ordinates, in the precision of these."""
+        c0, c1, c2, c3 = (y.dtype.type(c) for c in coefficients)
+        z = np.abs(y)
+        with np.errstate(all="ignore"):
+            # With a camera z = 1 / y, and an ordinate is off by y^2 of what the depth is off.
+            of_y = (((c0 * y + c1) * y + c2) * y + c3) / y if self.projective else ((c3 * z + c2) * z + c1) * z + c0
+        return np.where(of_y > y.dtype.type(SMALLEST), of_y, y.dtype.type(SMALLEST))
 
     def _grid(self, pixels):
         u, v = np.array(pixels).T
@@ -373,7 +422,7 @@ class Detector:
                 s.curve = fitted(_doubles(line.x, k), _doubles(line.y, k), len(k) - 1)
         else:
             for s in segments:
-                s.curve = self._fit(line, s)
+                s.curve = line.fit(s.first, s.last)
             for refinement in REFINEMENTS if self.p.mergeSignificance > 0 else ():
                 segments = getattr(self, "_" + refinement)(line, segments)
         found = []
@@ -383,11 +432,6 @@ class Detector:
                 if candidate.jump > 0 or candidate.crease > 0:
                     found.append(candidate)
         return found
-
-    def _fit(self, line, s):
-        k = np.arange(s.first, s.last + 1)
-        sigma = line.sigma[s.first + s.size // 2]
-        return least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
 
     def _merged(self, line, segments):
         """In every round, cuts that cost less than those beside them are taken back."""
@@ -400,16 +444,21 @@ class Detector:
                 return segments
             for i in reversed(chosen):
                 union = Segment(segments[i].first, segments[i + 1].last)
-                union.curve = self._fit(line, union)
+                union.curve = line.fit(union.first, union.last)
                 segments = [*segments[:i], union, *segments[i + 2 :]]
 
     def _cost(self, line, left, right):
-        """By how much one curve for both raises the sum of squared residuals, in variances of the noise."""
+        """By how much one curve for both raises the sum of squared residuals, in variances of the shorter one's fit."""
         if not _adjacent(line, left, right):
             return math.inf
-        k, sigma = np.arange(left.first, right.last + 1), line.sigma[left.last]
-        one = least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
-        return (one.sum_squares - left.curve.sum_squares - right.curve.sum_squares) / sigma**2
+        one = line.fit(left.first, right.last, left.last)
+        rise = one.sum_squares - left.curve.sum_squares - right.curve.sum_squares
+        return rise / self._joining_deviation(line, left.last, min(left.size, right.size)) ** 2
+
+    @staticmethod
+    def _joining_deviation(line, k, n):
+        """By slope or value, whichever is the noisier one, of a fit to n samples around k."""
+        return max(line.noise.factor("slope", n), line.noise.factor("value", n)) * line.deviation(k, n)
 
     def _dissolved(self, line, segments):
         segments = list(segments)
@@ -431,12 +480,14 @@ class Detector:
         if x is None or not line.x[s.first - 1] <= x <= line.x[s.last + 1]:
             return None
         cut = max([s.first - 1] + [k for k in range(s.first, s.last + 1) if line.x[k] <= x])
-        pair, sigma = [Segment(left.first, cut), Segment(cut + 1, right.last)], line.sigma[s.first + s.size // 2]
+        pair, k = [Segment(left.first, cut), Segment(cut + 1, right.last)], s.first + s.size // 2
+        squares = sum(line.fit(part.first, part.last, k).sum_squares for part in pair)
+        rise = squares - sum(part.curve.sum_squares for part in (left, s, right))
+        if not rise < (STRADDLING * self.p.mergeSignificance * self._joining_deviation(line, k, s.size)) ** 2:
+            return None
         for part in pair:
-            k = np.arange(part.first, part.last + 1)
-            part.curve = least_squares(_doubles(line.x, k), _doubles(line.y, k), sigma)
-        rise = sum(p.curve.sum_squares for p in pair) - sum(p.curve.sum_squares for p in (left, s, right))
-        return pair if rise < (STRADDLING * self.p.mergeSignificance * sigma) ** 2 else None
+            part.curve = line.fit(part.first, part.last)
+        return pair
 
     def _position(self, line, left, right):
         """Pixels before and after the edge, its abscissa, its place in samples, and whether the curves meet there."""
@@ -478,26 +529,30 @@ class Detector:
         height = (lambda y: 1 / y) if line.projective else (lambda y: y)
         jump = 0.0 if meets else abs(height(yf) - height(yg))
         bend = line.crease(xf, (zf, mf), xg, (zg, mg))
-        sigma = (line.sigma[before] + line.sigma[after]) / 2
-        jump_deviation = sigma * math.sqrt(left.curve.value_variance(xf) + right.curve.value_variance(xg))
-        crease_deviation = sigma * math.sqrt(
-            line.turn(xf, zf, mf) ** 2 * left.curve.slope_variance(xf)
-            + line.turn(xg, zg, mg) ** 2 * right.curve.slope_variance(xg)
-        )
+        f, g = _SideDeviation(line, left, before, xf), _SideDeviation(line, right, after, xg)
+        turns = line.turn(xf, zf, mf), line.turn(xg, zg, mg)
+
+        def significances(value, slope):
+            """Of the jump and the crease, by these factors on what white noise does."""
+            jump_deviation = math.hypot(f.value(value), g.value(value))
+            crease_deviation = math.hypot(turns[0] * f.slope(slope), turns[1] * g.slope(slope))
+            return abs(yf - yg) / jump_deviation, abs(bend) / crease_deviation
+
+        jump_alone, crease_alone = significances("value", "slope")
+        jump_shared, crease_shared = significances("shared_value", "shared_slope")
         least = min(LONE_SIGNIFICANCE, self.p.minSignificance)
-        jump_significance, crease_significance = abs(yf - yg) / jump_deviation, abs(bend) / crease_deviation
-        if jump_significance < least:
+        if jump_alone < least:
             jump = 0.0
-        crease = math.degrees(abs(bend)) if crease_significance >= least else 0.0
+        crease = math.degrees(abs(bend)) if crease_alone >= least else 0.0
         kind = 0
         error = JUMP_TOLERANCES * max(line.tolerance[before], line.tolerance[after])
-        if jump > 0 and abs(yf - yg) > error and jump_significance > JUMP_ALONE:
+        if jump > 0 and abs(yf - yg) > error and jump_alone > JUMP_ALONE:
             kind |= EDGE_JUMP | (EDGE_OCCLUDING if yf > yg else EDGE_OCCLUDED)
         if crease > 0:
             kind |= EDGE_CONVEX if bend > 0 else EDGE_CONCAVE
         (u, v), (dx, dy) = line.pixels[0], STEPS[line.direction]
         place, along = (np.array(p) for p in line.place(x))
-        sides = [(yf, mf, left.curve.slope_variance(xf)), (yg, mg, right.curve.slope_variance(xg))]
+        sides = [(yf, mf, f.slope("slope") ** 2), (yg, mg, g.slope("slope") ** 2)]
         unit = float(np.hypot(*along))
         return Candidate(
             x=u + sample * dx,
@@ -505,7 +560,7 @@ class Detector:
             shift=sample - (left.last + right.first) / 2,
             jump=jump,
             crease=crease,
-            significance=max(jump_significance if jump > 0 else 0.0, crease_significance if crease > 0 else 0.0),
+            significance=max(jump_shared if jump > 0 else 0.0, crease_shared if crease > 0 else 0.0),
             kind=kind,
             direction=line.direction,
             pixels=(line.pixels[before], line.pixels[after]),
@@ -513,6 +568,26 @@ class Detector:
             along=along / unit,
             sides=[(value, slope / unit, variance / unit**2) for value, slope, variance in sides],
         )
+
+
+@dataclass
+class _SideDeviation:
+    """What noise does to the curve of a segment at an abscissa, beside sample k; `name` is that of a factor."""
+
+    line: Line
+    segment: Segment
+    k: int
+    x: float
+
+    def value(self, name):
+        return self._of(name, self.segment.curve.value_variance(self.x))
+
+    def slope(self, name):
+        return self._of(name, self.segment.curve.slope_variance(self.x))
+
+    def _of(self, name, variance):
+        n = self.segment.size
+        return self.line.noise.factor(name, n) * self.line.deviation(self.k, n) * math.sqrt(variance)
 
 
 def _doubles(values, k):
