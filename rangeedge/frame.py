@@ -182,7 +182,9 @@ def _grid(
     if inside is not None:
         height = height.copy() if np.shares_memory(height, src) else height
         height[~inside] = np.nan
-    return Frame(height, False, (spacing[0], 0.0, 0.0, 0.0, spacing[1], 0.0), (0.0, 0.0, 1.0), heightMap, _step(src, depthFactor))
+    return Frame(
+        height, False, (spacing[0], 0.0, 0.0, 0.0, spacing[1], 0.0), (0.0, 0.0, 1.0), heightMap, _step(src, depthFactor)
+    )
 
 
 def _points(src: np.ndarray, inside: np.ndarray | None, heightMap: bool) -> Frame:
