@@ -2,19 +2,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstddef>
-#include <vector>
 
 namespace rangeedge {
 
+// The value of a rank among magnitudes, 0 being that of the smallest. `padding` more values than `count` may be read
+// here and below.
+float ranked(const float* magnitudes, std::size_t count, std::size_t rank);
+
 // The deviation of normal values around 0, given their magnitudes: the root mean square of the smallest three quarters,
-// corrected for the trimming. 0 of none. `padding` more values than `count` may be read.
+// corrected for the trimming. 0 of none.
 double trimmed_deviation(const float* magnitudes, std::size_t count);
 
-// The same by the lower quartile of the magnitudes, which are put in another order.
-double quartile_deviation(std::vector<float>& magnitudes);
+// The same by the lower quartile of the magnitudes.
+double quartile_deviation(const float* magnitudes, std::size_t count);
 
-// The same by the median of the magnitudes, which are put in another order; for a few thousand. Less where many small
-// ones are far smaller than those of normal values would be: then the median itself is one of the outliers.
-double median_deviation(std::vector<float>& magnitudes);
+// The same by the median of the magnitudes. Less where many small ones are far smaller than those of normal values would
+// be: then the median itself is one of the outliers.
+double median_deviation(const float* magnitudes, std::size_t count);
 
 }  // namespace rangeedge
