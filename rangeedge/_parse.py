@@ -10,6 +10,13 @@ from .constants import DIR_ALL, DIR_COLS, DIR_DIAG45, DIR_DIAG135, DIR_ROWS
 from .noise_model import NoiseModel
 
 DIRECTIONS = {"rows": DIR_ROWS, "cols": DIR_COLS, "diag45": DIR_DIAG45, "diag135": DIR_DIAG135, "all": DIR_ALL}
+SENSORS = {
+    "realsense": NoiseModel.realsense,
+    "azureKinect": NoiseModel.azureKinect,
+    "kinect1": NoiseModel.kinect1,
+    "kinect2": NoiseModel.kinect2,
+    "structuredLight": NoiseModel.structuredLight,
+}
 
 
 def camera(text: str) -> np.ndarray:
@@ -23,11 +30,12 @@ def pixel_size(text: str) -> float | tuple[float, ...]:
 
 
 def noise(text: str) -> float | NoiseModel:
-    if text == "kinect1":
-        return NoiseModel.kinect1()
-    if text == "kinect2":
-        return NoiseModel.kinect2()
-    numbers = _numbers(text, (1, 3, 4), "a length, a,b,c or a,b,c,correlation, kinect1 or kinect2")
+    if text in SENSORS:
+        return SENSORS[text]()
+    names = ", ".join(SENSORS)
+    numbers = _numbers(
+        text, (1, 3, 4, 5), f"a length, a,b,c, a,b,c,correlation, a,b,c,correlation,length or one of {names}"
+    )
     return numbers[0] if len(numbers) == 1 else NoiseModel(*numbers)
 
 

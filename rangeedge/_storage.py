@@ -83,7 +83,7 @@ def read(node: cv2.FileNode) -> dict[str, Any]:
         try:
             values["noise"] = NoiseModel(**values["noise"])
         except TypeError:
-            raise fail("noise", "a number, an array, or a, b, c, correlation", values["noise"]) from None
+            raise fail("noise", "a number, an array, or what a NoiseModel holds", values["noise"]) from None
     return values
 
 
@@ -97,10 +97,7 @@ def _write_node(fs: cv2.FileStorage, name: str, value: Any) -> None:
     if value is None:
         return
     if isinstance(value, NoiseModel):
-        fs.startWriteStruct(name, cv2.FileNode_MAP)
-        for key, coefficient in asdict(value).items():
-            fs.write(key, float(coefficient))
-        fs.endWriteStruct()
+        write(fs, name, asdict(value))
     elif isinstance(value, tuple):
         fs.startWriteStruct(name, cv2.FileNode_SEQ)
         for element in value:

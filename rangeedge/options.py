@@ -169,8 +169,8 @@ class ScanLineParams(Options):
         group="noise",
         read=_parse.noise,
         metavar="NOISE",
-        flagged="deviation of the values: a length, or A,B,C[,CORRELATION] for a + b z + c z^2, or kinect1, kinect2"
-        " (default: estimated)",
+        flagged="deviation of the values: a length, or A,B,C[,CORRELATION[,LENGTH]] for a + b z + c z^2, or"
+        f" {', '.join(_parse.SENSORS)} (default: estimated)",
     )
     directions: int = option(
         DIR_ALL,

@@ -118,7 +118,7 @@ def test_options_as_json():
     assert plain(nested) == {
         "K": [[1.5, 2], ["nan"]],
         "flag": True,
-        "noise": {"a": 0.5, "b": 0, "c": 0, "correlation": 1},
+        "noise": {"a": 0.5, "b": 0, "c": 0, "correlation": 1, "length": 0, "fits": None},
         "eps": None,
     }
     assert plain(np.array([1, -np.inf])) == [1, "-inf"]

@@ -100,11 +100,22 @@ class TestDetect:
         np.testing.assert_array_equal(written["kind"], points["kind"])
 
     def test_report(self, image, tmp_path, capsys):
-        run(capsys, "detect", image, *CAMERA, "--noise", "0.001,0,0.002", "--min-length", 9, "--out", tmp_path / "out")
+        run(
+            capsys,
+            "detect",
+            image,
+            *CAMERA,
+            "--noise",
+            "0.001,0,0.002,1.5,4",
+            "--min-length",
+            9,
+            "--out",
+            tmp_path / "out",
+        )
         report = json.loads((tmp_path / "out" / "report.json").read_text())
         assert report["options"]["K"] == K.tolist()
         assert report["options"]["minLength"] == 9
-        assert report["noise"] == {"a": 0.001, "b": 0, "c": 0.002, "correlation": 1}
+        assert report["noise"] == {"a": 0.001, "b": 0, "c": 0.002, "correlation": 1.5, "length": 4, "fits": None}
         assert (report["height"], report["width"], report["validPixels"]) == (60, 80, 4799)
 
     @pytest.mark.parametrize(

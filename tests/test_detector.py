@@ -156,7 +156,7 @@ def test_stray_crease_pixels_do_not_count_nor_jumps_on_the_farther_side():
     crease[1, 3:5] = 40
     jump[8] = jump[7] = 1
     kind[7], kind[8] = EDGE_OCCLUDING | EDGE_JUMP, EDGE_OCCLUDED | EDGE_JUMP
-    edges = selectEdges(EdgeStrength(jump, crease, kind, jump), minLength=1)
+    edges = selectEdges(EdgeStrength(jump, crease, kind, np.full((9, 9), 20.0, np.float32)), minLength=1)
     expected = np.zeros((9, 9), np.uint8)
     expected[4:6, 1:8] = expected[7] = 255
     np.testing.assert_array_equal(edges, expected)
@@ -168,7 +168,7 @@ def test_stray_creases_do_not_count_at_no_threshold_either(creaseThreshold):
     crease[4:6, 1:8] = 1
     crease[1, 3:5] = 1
     strength = EdgeStrength(nothing, crease, nothing.astype(np.uint8), nothing)
-    edges = selectEdges(strength, creaseThreshold=creaseThreshold, minLength=1)
+    edges = selectEdges(strength, creaseThreshold=creaseThreshold, minLength=1, lineSignificance=0)
     assert not edges[1].any()
     assert edges[4:6, 1:8].all()
 
@@ -425,6 +425,7 @@ def test_clear_empty_name_and_repr(detector):
         {"noise": None, "K": None, "eps": None, "pixelSize": None},
         {"noise": 0.0025},
         {"noise": NoiseModel.kinect1()},
+        {"noise": NoiseModel(2.0, fits=(2.0, 0, 0, 0, *np.linspace(0.5, 12, 42) ** 1.1))},
         {"noise": np.random.default_rng(3).uniform(0.1, 9, (7, 5)).astype(np.float32)},
         {"noise": np.float32([[np.nan, 0.1], [np.inf, 1e-30]])},
         {"pixelSize": 0.7, "K": None},
@@ -493,6 +494,7 @@ def test_a_file_of_version_0_1_is_read(tmp_path, detector):
     )
     detector.load(path)
     old = {"eps": 0.25, "noise": NoiseModel(a=0.5), "heightMap": True, "maxGap": 2}
+    old |= {"mergeSignificance": 5.0, "minSignificance": 12.0}
     same(get_all(detector), {**DEFAULTS, **old})
     path.write_text(path.read_text().removesuffix("complete: 1\n"))
     with pytest.raises(rangeedge.error, match="is not complete"):
@@ -506,6 +508,9 @@ BAD_NODES = {
     "maxGap: 2.5": "`maxGap` must be an integer",
     "heightMap: 2": "`heightMap` must be True or False",
     "noise: { a: 1, d: 2 }": "`noise` must be",
+    "noise: { a: 1, fits: 3 }": "`fits` must be",
+    "noise: { a: 1, fits: [ 1, 2 ] }": "`fits` must be",
+    "noise: { a: 1, fits: [ x ] }": "`fits` must be",
     "noise: { a: 0 }": "one of `a`, `b`, `c` must differ from 0",
     "K: [ 1, 2 ]": "`K` must be",
     "pixelSize: [ 1, 2, 3 ]": "`pixelSize` must be",

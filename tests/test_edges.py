@@ -98,7 +98,7 @@ SETTINGS = [
     dict(minSignificance=0.0, measure=MEASURE_ENDPOINT),
     dict(fit=FIT_INTERP, minSignificance=2.3),
     dict(fit=FIT_INTERP, measure=MEASURE_ENDPOINT, minSignificance=0.0, maxShift=0.0),
-    dict(fit=FIT_INTERP, directions=DIR_COLS | DIR_DIAG45),
+    dict(fit=FIT_INTERP, directions=DIR_COLS | DIR_DIAG45, minSignificance=2.3),
     dict(crease=CREASE_NORMAL, minSignificance=2.3),
     dict(crease=CREASE_NORMAL, fit=FIT_INTERP, minSignificance=0.0),
     dict(eps=0.012, minSignificance=2.3),
@@ -107,11 +107,19 @@ SETTINGS = [
     dict(eps=0.012, crease=CREASE_NORMAL),
     dict(ScanLineParams.paper(eps=0.01).__dict__),
 ]
+# As estimated from a stereo camera: waves that grow with the depth, and of which fits along columns know more.
+FITS = (
+    0.0004, 0.0002, 0.0003, 0.0004,
+    1.4, 3.3, 8.2, 17.8, 25.1, 1.0, 1.4, 4.7, 14.8, 20.8, 1.5, 4.0, 16.7, 40.1, 56.6, 1.3, 2.1, 9.2, 32.1, 45.2, 2.6,
+    1.8, 3.9, 9.9, 17.7, 25.0, 1.2, 2.0, 6.9, 13.5, 19.0, 2.1, 4.8, 15.9, 39.8, 56.2, 1.5, 2.8, 10.4, 26.8, 37.8, 3.5,
+)  # fmt: skip
 NOISE = [
     NoiseModel(0.003),
     NoiseModel(c=0.0015, correlation=1.3),
     NoiseModel(0.001, 0.0004, 0.0003),
     NoiseModel(b=0.002),
+    NoiseModel(0.002, c=0.0004, correlation=2.2, length=3.5),
+    NoiseModel(0.001, c=0.0003, fits=FITS),
 ]
 SMALL, LARGE = [(1, 1), (1, 17), (13, 1), (2, 9), (3, 3)], (14, 23)
 
@@ -140,6 +148,23 @@ def test_images_of_every_shape_as_the_oracle_has_them(setting):
         for src, image, geometry in cases:
             found += len(same_as_oracle(src, image, **geometry))
     assert found > 0
+
+
+@pytest.mark.parametrize("noise", NOISE)
+@pytest.mark.parametrize("geometry", ["grid", "camera", "points"])
+def test_long_segments_as_the_oracle_has_them(geometry, noise):
+    """The noise of fits changes with their number of samples: up to 64 and beyond."""
+    rng = np.random.default_rng(17)
+    u = np.arange(170.0)
+    z = np.interp(u, [0, 30, 100, 101, 169], [1.6, 1.3, 1.5, 1.2, 1.4]) + 0.02 * (u > 140) * np.ones((3, 1))
+    z = z + cv2.GaussianBlur(0.01 * rng.standard_normal(z.shape), (0, 0), 3.0) + 0.001 * rng.standard_normal(z.shape)
+    for params in (ScanLineParams(), ScanLineParams(minSignificance=1.5, mergeSignificance=2.0, epsFactor=2.0)):
+        src = seen(z) if geometry == "points" else z
+        image = oracle.Image(
+            src, K=K if geometry == "camera" else None, projective=geometry != "grid", noise=noise, params=params
+        )
+        found = same_as_oracle(src, image, **(dict(K=K) if geometry == "camera" else {}))
+        assert len(found) > 0
 
 
 def checkerboard(shape):

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/parallel.hpp"
 #include "noise/least_squares.hpp"
 #include "noise/single.hpp"
 
@@ -42,14 +43,15 @@ Deviation of_depths(const SingleNoise& found, double rounding) {
 
 template <class T>
 NoiseEstimate estimate_noise(const T* ordinate, int rows, int cols, bool projective, double step, int threads) {
-    const SingleNoise found = single_noise(ordinate, rows, cols, projective, threads);
+    Team team(std::min(threads, 2));  // for more there is too little to do
+    const SingleNoise found = single_noise(ordinate, rows, cols, projective, team);
     const double rounding = step / std::sqrt(12.0);
     NoiseEstimate estimate;
     estimate.single = projective ? of_depths(found, rounding) : of_heights(found, rounding);
     // Of the noise of neighbours nothing is to be seen.
     const double middle = (found.lowest + found.highest) / 2, extent = found.highest - found.lowest;
     const bool silent = found.quiet <= finest * (projective ? std::abs(middle) : extent);
-    estimate.fits = fit_noise(ordinate, rows, cols, projective, estimate.single, silent, threads);
+    estimate.fits = fit_noise(ordinate, rows, cols, projective, estimate.single, silent, team);
     return estimate;
 }
 

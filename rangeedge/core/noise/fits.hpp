@@ -21,6 +21,8 @@
 
 namespace rangeedge {
 
+class Team;
+
 struct FitNoiseEstimate {
     Deviation waves;
     double rows[FitNoise::size], cols[FitNoise::size];  // what FitNoise takes
@@ -28,7 +30,7 @@ struct FitNoiseEstimate {
 
 // Of an image of ordinates whose single values are off by `single`, or by nothing that could be seen (`silent`).
 template <class T>
-FitNoiseEstimate fit_noise(const T* ordinate, int rows, int cols, bool projective, const Deviation& single,
-                           bool silent, int threads);
+FitNoiseEstimate fit_noise(const T* ordinate, int rows, int cols, bool projective, const Deviation& single, bool silent,
+                           Team& team);
 
 }  // namespace rangeedge

@@ -16,7 +16,8 @@ bool solve(const double (&matrix)[most_powers][most_powers], const double (&righ
     const int n = static_cast<int>(set.size());
     double a[most_powers][most_powers + 1];
     for (int i = 0; i < n; ++i) {
-        for (int j = 0; j < n; ++j) a[i][j] = matrix[set[static_cast<std::size_t>(i)]][set[static_cast<std::size_t>(j)]];
+        for (int j = 0; j < n; ++j)
+            a[i][j] = matrix[set[static_cast<std::size_t>(i)]][set[static_cast<std::size_t>(j)]];
         a[i][n] = right[set[static_cast<std::size_t>(i)]];
     }
     for (int i = 0; i < n; ++i) {

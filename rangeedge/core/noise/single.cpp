@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 
 #include "base/parallel.hpp"
@@ -14,14 +15,16 @@
 namespace rangeedge {
 namespace {
 
-constexpr std::ptrdiff_t most_windows = 1 << 15;  // along rows, and along columns
-constexpr std::size_t fewest_windows = 200;       // that tell the noise
-constexpr int farthest = 4;                       // samples between those that are taken for neighbours
+constexpr int most_windows = 1 << 14;        // along rows, and along columns
+constexpr std::size_t fewest_windows = 200;  // that tell the noise
+constexpr int farthest = 4;                  // samples between those that are taken for neighbours
+constexpr int constant_run = 8;              // equal samples that say nothing
 constexpr std::size_t most_bins = 8;
-constexpr std::size_t least_bin = 50;      // windows
-constexpr double quantised_share = 0.3;    // of windows with equal neighbours: more have values with a step
-constexpr std::size_t ranked_windows = 4096;  // that tell the borders of bins
-constexpr double coarsest_step = 5e-3;
+constexpr std::size_t least_bin = 50;    // windows
+constexpr double quantised_share = 0.3;  // of windows with equal neighbours: more have values with a step
+constexpr double exact_share = 0.7;      // of constant windows: at least so many has an image of constant faces
+constexpr double flicker_share = 0.1;    // of other windows with equal neighbours that change twice: more are noise
+constexpr double fewest_levels = 8;      // that values take which are multiples of a step
 const double per_difference = std::sqrt(20.0);  // deviation of a third difference of independent values
 
 // Of windows of four samples: the magnitude of the third difference, the mean ordinate, and the least difference of
@@ -30,13 +33,43 @@ const double per_difference = std::sqrt(20.0);  // deviation of a third differen
 struct Windows {
     std::size_t count = 0;
     std::vector<float> differences, ordinates, steps;  // with `padding` more
+    std::size_t constant = 0, changing_twice = 0;      // windows not counted; those with two changes and an equal pair
+    bool counts_constant = false;
 
-    void reserve(std::ptrdiff_t windows) {
-        for (auto* values : {&differences, &ordinates, &steps}) values->resize(count + static_cast<std::size_t>(windows) + padding);
+    void reserve(std::size_t windows) {
+        for (auto* values : {&differences, &ordinates, &steps}) values->resize(count + windows + padding);
     }
-    // The window that begins at y, of samples `apart`; two more on either side are of the same line.
+    // All windows of one line, of samples `apart`.
     template <class T>
-    RANGEEDGE_INLINE void add(const T* y, std::ptrdiff_t apart) {
+    void add_line(const T* y, int size, int apart) {
+        const int number = size - 3 * apart;
+        if (number <= 0) return;
+        mark_constant(y, size, apart);
+        reserve(static_cast<std::size_t>(number));
+        for (int k = 0; k < number; ++k) {
+            const std::uint8_t* still = still_.data() + k;
+            const bool is_constant = still[0] | still[apart] | still[2 * apart] | still[3 * apart];
+            constant += is_constant;
+            add(y + k, apart, counts_constant | !is_constant);
+        }
+    }
+
+private:
+    // Marks the samples that belong to many equal ones, `apart`.
+    template <class T>
+    void mark_constant(const T* y, int size, int apart) {
+        still_.assign(static_cast<std::size_t>(size), 0);
+        for (int phase = 0; phase < apart; ++phase)
+            for (int k = phase; k < size;) {
+                const int first = k;
+                do k += apart;
+                while (k < size && y[k] == y[first]);
+                if ((k - first) / apart < constant_run) continue;
+                for (int i = first; i < k; i += apart) still_[static_cast<std::size_t>(i)] = 1;
+            }
+    }
+    template <class T>
+    RANGEEDGE_INLINE void add(const T* y, int apart, bool counts) {
         constexpr float most = std::numeric_limits<float>::max();
         const double y0 = static_cast<double>(y[0]), y1 = static_cast<double>(y[apart]);
         const double y2 = static_cast<double>(y[2 * apart]), y3 = static_cast<double>(y[3 * apart]);
@@ -44,131 +77,147 @@ struct Windows {
         const auto difference = static_cast<float>(std::abs(y3 - y0 - 3 * (y2 - y1)));
         const auto mean = static_cast<float>((y0 + y1 + y2 + y3) / 4);
         const auto least = [](double p, double q) { return p == 0 || (q < p && q > 0) ? q : p; };
+        const int changes = (a != 0) + (b != 0) + (c != 0);
         differences[count] = difference;
         ordinates[count] = mean;
-        steps[count] = static_cast<float>((a == 0) | (b == 0) | (c == 0) ? least(least(a, b), c) : 0);
-        const bool constant = (a == 0) & (b == 0) & (c == 0) & (y[-2 * apart] == y[-apart]) & (y[-apart] == y[0]) &
-                              (y[3 * apart] == y[4 * apart]) & (y[4 * apart] == y[5 * apart]);
-        count += (difference <= most) & (std::abs(mean) <= most) & !constant;  // not so with NaN
+        steps[count] = static_cast<float>(changes < 3 ? least(least(a, b), c) : 0);
+        counts &= (difference <= most) & (std::abs(mean) <= most);  // not so with NaN
+        count += counts;
+        changing_twice += counts & (changes == 2);
     }
-    // Every so many of `number` windows that begin side by side, the same ones whichever end is the first.
-    template <class T>
-    void add_line(const T* y, std::ptrdiff_t number, std::ptrdiff_t every, std::ptrdiff_t apart) {
-        for (std::ptrdiff_t i = 0; 2 * i < number; i += every) {
-            add(y + i, apart);
-            if (2 * i < number - 1) add(y + number - 1 - i, apart);
-        }
-    }
+
+    std::vector<std::uint8_t> still_;
 };
 
+// The lines of a direction that are looked at, the same ones from either side.
+std::vector<int> sampled(int lines, int every) {
+    std::vector<int> chosen;
+    for (int i = 0; i < lines; ++i)
+        if (std::min(i, lines - 1 - i) % every == 0) chosen.push_back(i);
+    return chosen;
+}
+
 template <class T>
-Windows windows_of(const T* ordinate, std::ptrdiff_t rows, std::ptrdiff_t cols, std::ptrdiff_t apart) {
-    const std::ptrdiff_t every = 1 + rows * cols / most_windows;
-    const std::ptrdiff_t margin = 2 * apart;  // samples on either side of a window
-    const std::ptrdiff_t down = std::max<std::ptrdiff_t>(0, rows - 3 * apart - 2 * margin);
-    const std::ptrdiff_t along = std::max<std::ptrdiff_t>(0, cols - 3 * apart - 2 * margin);
+Windows windows_of(const T* ordinate, int rows, int cols, int apart, bool counts_constant) {
+    const int every = 1 + static_cast<int>(static_cast<std::int64_t>(rows) * cols / most_windows);
     Windows windows;
-    windows.reserve(down * (cols / every + 2) + along * (rows / every + 2));
-    for (std::ptrdiff_t v = 0; v < down; ++v)
-        windows.add_line(ordinate + (v + margin) * cols, cols, every, apart * cols);
-    for (std::ptrdiff_t i = 0; i < rows; ++i) {
-        if (std::min(i, rows - 1 - i) % every != 0) continue;
-        const T* line = ordinate + i * cols;
-        for (std::ptrdiff_t u = 0; u < along; ++u) windows.add(line + u + margin, apart);
+    windows.counts_constant = counts_constant;
+    for (const int v : sampled(rows, every))
+        windows.add_line(ordinate + static_cast<std::ptrdiff_t>(v) * cols, cols, apart);
+    // Columns are copied, several at a time, since the image lies row by row.
+    const std::vector<int> columns = sampled(cols, every);
+    std::vector<T> copies(columns.size() * static_cast<std::size_t>(rows));
+    for (std::size_t v = 0; v < static_cast<std::size_t>(rows); ++v) {
+        const T* row = ordinate + v * static_cast<std::size_t>(cols);
+        for (std::size_t i = 0; i < columns.size(); ++i)
+            copies[i * static_cast<std::size_t>(rows) + v] = row[columns[i]];
     }
+    for (std::size_t i = 0; i < columns.size(); ++i)
+        windows.add_line(copies.data() + i * static_cast<std::size_t>(rows), rows, apart);
     return windows;
 }
 
-// The deviation of rounding to the step that quantised values show; 0 of others.
-double rounding_deviation(const float* steps, std::size_t count, double coarsest) {
-    std::vector<float> equal;
-    for (std::size_t k = 0; k < count; ++k)
-        if (steps[k] > 0) equal.push_back(steps[k]);
-    if (equal.empty() || static_cast<double>(equal.size()) < quantised_share * static_cast<double>(count)) return 0;
-    const auto middle = equal.begin() + static_cast<std::ptrdiff_t>(equal.size() / 2);
-    std::nth_element(equal.begin(), middle, equal.end());
-    const auto step = static_cast<double>(*middle);
-    return step <= coarsest ? step / std::sqrt(12.0) : 0;
+// The step that quantised values show; 0 of others.
+double quantisation(const float* steps, std::size_t count) {
+    const auto equal = count - static_cast<std::size_t>(std::count(steps, steps + count, 0.0f));
+    if (equal == 0 || static_cast<double>(equal) < quantised_share * static_cast<double>(count)) return 0;
+    return static_cast<double>(ranked(steps, count, count - equal + equal / 2));
+}
+
+// Whether nearly all is constant, and what is not are clean steps between few levels.
+bool is_exact(const Windows& w, double extent) {
+    const double all = static_cast<double>(w.constant + w.count), step = quantisation(w.steps.data(), w.count);
+    return step > extent / fewest_levels && static_cast<double>(w.constant) >= exact_share * all &&
+           static_cast<double>(w.changing_twice) <= flicker_share * static_cast<double>(w.count);
 }
 
 // The deviation that third differences show, not below that of rounding.
-double deviation_of(const float* differences, const float* steps, std::size_t count, double coarsest) {
-    const double rounding = rounding_deviation(steps, count, coarsest);
-    return std::max(trimmed_deviation(differences, count) / per_difference, rounding);
+double deviation_of(const float* differences, const float* steps, std::size_t count) {
+    return std::max(trimmed_deviation(differences, count) / per_difference,
+                    quantisation(steps, count) / std::sqrt(12.0));
 }
 
-// The windows of one range of ordinates.
-struct Bin {
-    std::vector<float> differences, steps;
-    double sum = 0;  // of ordinates
+// Windows in the order of ranges of their ordinates, which are positive.
+struct Bins {
+    std::vector<float> differences, steps;  // with `padding` more
+    std::vector<std::size_t> starts;        // of each bin, and the end of the last one
+    std::vector<double> ordinates;          // the mean of each
 };
 
-// As many windows in each, but for the coarseness of the borders.
-std::vector<Bin> bins_of(const Windows& windows) {
-    const std::size_t count = windows.count, every = 1 + count / ranked_windows;
-    std::vector<float> ranked;
-    for (std::size_t k = 0; k < count; k += every) ranked.push_back(windows.ordinates[k]);
-    std::sort(ranked.begin(), ranked.end());
-    std::vector<Bin> bins(std::max<std::size_t>(1, std::min(most_bins, count / least_bin)));
-    std::vector<float> borders;
-    for (std::size_t i = 1; i < bins.size(); ++i) borders.push_back(ranked[i * ranked.size() / bins.size()]);
+// As many windows in each, but for equal ordinates.
+Bins bins_of(const Windows& windows) {
+    const std::size_t count = windows.count, number = std::max<std::size_t>(1, std::min(most_bins, count / least_bin));
+    std::vector<float> borders(number - 1);
+    for (std::size_t i = 1; i < number; ++i)
+        borders[i - 1] = ranked(windows.ordinates.data(), count, i * count / number);
+    std::vector<std::uint8_t> own(count, 0);
+    for (const float border : borders)
+        for (std::size_t k = 0; k < count; ++k)
+            own[k] = static_cast<std::uint8_t>(own[k] + (windows.ordinates[k] > border));
+    Bins bins{std::vector<float>(count + padding), std::vector<float>(count + padding),
+              std::vector<std::size_t>(number + 1, 0), std::vector<double>(number, 0.0)};
+    for (std::size_t k = 0; k < count; ++k) ++bins.starts[own[k] + std::size_t{1}];
+    for (std::size_t i = 0; i < number; ++i) bins.starts[i + 1] += bins.starts[i];
+    std::vector<std::size_t> next(bins.starts.begin(), bins.starts.end() - 1);
     for (std::size_t k = 0; k < count; ++k) {
-        std::size_t own = 0;
-        for (const float border : borders) own += windows.ordinates[k] > border;
-        bins[own].differences.push_back(windows.differences[k]);
-        bins[own].steps.push_back(windows.steps[k]);
-        bins[own].sum += static_cast<double>(windows.ordinates[k]);
+        const std::size_t at = next[own[k]]++;
+        bins.differences[at] = windows.differences[k];
+        bins.steps[at] = windows.steps[k];
+        bins.ordinates[own[k]] += static_cast<double>(windows.ordinates[k]);
     }
+    for (std::size_t i = 0; i < number; ++i)
+        bins.ordinates[i] /= static_cast<double>(std::max<std::size_t>(1, bins.starts[i + 1] - bins.starts[i]));
     return bins;
 }
 
 }  // namespace
 
 template <class T>
-SingleNoise single_noise(const T* ordinate, int rows, int cols, bool projective, int threads) {
+SingleNoise single_noise(const T* ordinate, int rows, int cols, bool by_ordinate, Team& team) {
     SingleNoise result;
     Windows windows;
-    for (int apart = 1; apart <= farthest && windows.count < fewest_windows; ++apart) {
-        Windows found = windows_of(ordinate, rows, cols, apart);
-        if (found.count > windows.count) windows = std::move(found);
+    int apart = 1;
+    for (int next = 1; next <= farthest && windows.count < fewest_windows; ++next) {
+        Windows found = windows_of(ordinate, rows, cols, next, false);
+        if (found.count > windows.count || next == 1) windows = std::move(found), apart = next;
     }
     if (windows.count == 0) return result;
-    const auto seen = windows.ordinates.begin();
-    const auto [low, high] = std::minmax_element(seen, seen + static_cast<std::ptrdiff_t>(windows.count));
-    result.lowest = static_cast<double>(*low), result.highest = static_cast<double>(*high);
-    // Of values that were rounded, at the most: a share of the distance, or of the range of heights.
-    const auto coarsest = [&](double ordinate_there) {
-        return coarsest_step * (projective ? std::abs(ordinate_there) : result.highest - result.lowest);
+    const auto extremes = [&] {
+        const auto begin = windows.ordinates.begin();
+        const auto [low, high] = std::minmax_element(begin, begin + static_cast<std::ptrdiff_t>(windows.count));
+        result.lowest = static_cast<double>(*low), result.highest = static_cast<double>(*high);
     };
-    const double coarsest_of_all = coarsest((result.lowest + result.highest) / 2);
-    std::vector<Bin> bins = bins_of(windows);
-    bins.erase(std::remove_if(bins.begin(), bins.end(), [](const Bin& b) { return b.steps.size() < 2; }), bins.end());
-    result.ordinates.resize(bins.size());
-    result.deviations.resize(bins.size());
-    Team team(std::min(threads, 2));  // for more there is too little to do
+    extremes();
+    if (is_exact(windows, result.highest - result.lowest)) {
+        windows = windows_of(ordinate, rows, cols, apart, true);
+        extremes();
+        windows.steps.assign(windows.steps.size(), 0.0f);
+    }
+    const Bins bins = by_ordinate ? bins_of(windows) : Bins{};
+    const std::size_t number = bins.ordinates.size();
+    std::vector<double> deviations(number);
     std::atomic<std::size_t> taken{0};
     team.run([&](int) {
-        for (std::size_t i; (i = taken++) <= bins.size();) {
+        for (std::size_t i; (i = taken++) <= number;) {
             if (i == 0) {
-                result.deviation = deviation_of(windows.differences.data(), windows.steps.data(), windows.count, coarsest_of_all);
-                std::vector<float> sizes(windows.differences);
-                sizes.resize(windows.count);
-                result.quiet = std::max(quartile_deviation(sizes) / per_difference,
-                                        rounding_deviation(windows.steps.data(), windows.count, coarsest_of_all));
+                result.deviation = deviation_of(windows.differences.data(), windows.steps.data(), windows.count);
+                result.quiet = std::max(quartile_deviation(windows.differences.data(), windows.count) / per_difference,
+                                        quantisation(windows.steps.data(), windows.count) / std::sqrt(12.0));
                 continue;
             }
-            Bin& bin = bins[i - 1];
-            const std::size_t count = bin.steps.size();
-            bin.differences.resize(count + padding);
-            result.ordinates[i - 1] = bin.sum / static_cast<double>(count);
-            result.deviations[i - 1] =
-                deviation_of(bin.differences.data(), bin.steps.data(), count, coarsest(result.ordinates[i - 1]));
+            const std::size_t start = bins.starts[i - 1], count = bins.starts[i] - start;
+            deviations[i - 1] = deviation_of(bins.differences.data() + start, bins.steps.data() + start, count);
         }
     });
+    for (std::size_t i = 0; i < number; ++i) {
+        if (bins.starts[i + 1] - bins.starts[i] < 2) continue;
+        result.ordinates.push_back(bins.ordinates[i]);
+        result.deviations.push_back(deviations[i]);
+    }
     return result;
 }
 
-template SingleNoise single_noise(const float*, int, int, bool, int);
-template SingleNoise single_noise(const double*, int, int, bool, int);
+template SingleNoise single_noise(const float*, int, int, bool, Team&);
+template SingleNoise single_noise(const double*, int, int, bool, Team&);
 
 }  // namespace rangeedge

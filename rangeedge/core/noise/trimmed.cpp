@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <utility>
+#include <vector>
 
 #include "base/simd.hpp"
 
@@ -13,11 +14,11 @@ namespace rangeedge {
 namespace {
 
 constexpr double kept_share = 0.75;
-constexpr double kept_deviation = 0.607;      // of a normal variable of deviation 1, within its central 75 %
+constexpr double kept_deviation = 0.607;       // of a normal variable of deviation 1, within its central 75 %
 constexpr double median_magnitude = 0.67449;   // of that variable
 constexpr double quarter_magnitude = 0.31864;  // the lower quartile of its magnitudes
 constexpr double tenth_magnitude = 0.12566;    // and their lowest tenth
-constexpr int dropped_bits = 20;              // of a float that its bucket does not tell: 8 buckets an octave are left
+constexpr int dropped_bits = 20;               // of a float that its bucket does not tell: 8 buckets an octave are left
 
 // The sum of the squares of values whose bits, as an integer, are below a limit.
 template <int bytes>
@@ -52,22 +53,40 @@ public:
         for (std::size_t i = 1; i < 4; ++i)
             for (std::size_t b = 0; b < buckets; ++b) counts_[0][b] += counts_[i][b];
     }
+    float value(std::size_t rank) const {
+        const Place place = find(rank);
+        return place.within[place.rank];
+    }
     // The sum of the squares of the smallest, as many as `count` > 0.
     double squares(std::size_t count) const {
-        std::size_t b = 0, before = 0;
-        while (before + counts_[0][b] < count) before += counts_[0][b++];
-        std::vector<float> within;
-        within.reserve(counts_[0][b]);
-        for (std::size_t k = 0; k < count_; ++k)
-            if (bucket(values_[k]) == b) within.push_back(values_[k]);
-        std::nth_element(within.begin(), within.begin() + static_cast<std::ptrdiff_t>(count - before - 1), within.end());
-        double sum = squares_below(values_, count_, static_cast<std::int32_t>(b << dropped_bits));
-        for (std::size_t k = 0; k < count - before; ++k)
-            sum += static_cast<double>(within[k]) * static_cast<double>(within[k]);
+        const Place place = find(count - 1);
+        double sum = squares_below(values_, count_, static_cast<std::int32_t>(place.bucket << dropped_bits));
+        for (std::size_t k = 0; k <= place.rank; ++k)
+            sum += static_cast<double>(place.within[k]) * static_cast<double>(place.within[k]);
         return sum;
     }
 
 private:
+    // The values of one bucket, in order at their own rank.
+    struct Place {
+        std::size_t bucket, rank;
+        std::vector<float> within;
+    };
+    Place find(std::size_t rank) const {
+        Place place{0, rank, {}};
+        while (counts_[0][place.bucket] <= place.rank) place.rank -= counts_[0][place.bucket++];
+        place.within.resize(counts_[0][place.bucket] + 1);
+        std::size_t found = 0;
+        for (std::size_t k = 0; k < count_; ++k) {  // without branches: each is written, and then counted if it belongs
+            place.within[found] = values_[k];
+            found += bucket(values_[k]) == place.bucket;
+        }
+        place.within.pop_back();
+        const auto begin = place.within.begin();
+        std::nth_element(begin, begin + static_cast<std::ptrdiff_t>(place.rank), place.within.end());
+        return place;
+    }
+
     static constexpr std::size_t buckets = std::size_t{1} << (31 - dropped_bits);
     static std::size_t bucket(float value) {
         std::uint32_t bits;
@@ -80,14 +99,6 @@ private:
     std::uint32_t counts_[4][buckets] = {};
 };
 
-// By the magnitude that one in `share` does not reach, which is `normal` for a variable of deviation 1.
-double quantile_deviation(std::vector<float>& magnitudes, std::size_t share, double normal) {
-    if (magnitudes.empty()) return 0;
-    const auto place = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / share);
-    std::nth_element(magnitudes.begin(), place, magnitudes.end());
-    return static_cast<double>(*place) / normal;
-}
-
 }  // namespace
 
 double trimmed_deviation(const float* magnitudes, std::size_t count) {
@@ -96,17 +107,24 @@ double trimmed_deviation(const float* magnitudes, std::size_t count) {
     return std::sqrt(Histogram(magnitudes, count).squares(kept) / static_cast<double>(kept)) / kept_deviation;
 }
 
-double quartile_deviation(std::vector<float>& magnitudes) {
-    return quantile_deviation(magnitudes, 4, quarter_magnitude);
+float ranked(const float* magnitudes, std::size_t count, std::size_t rank) {
+    return Histogram(magnitudes, count).value(rank);
 }
 
-double median_deviation(std::vector<float>& magnitudes) {
-    return quantile_deviation(magnitudes, 2, median_magnitude);
+double quartile_deviation(const float* magnitudes, std::size_t count) {
+    return count == 0 ? 0 : static_cast<double>(ranked(magnitudes, count, count / 4)) / quarter_magnitude;
 }
 
-double normal_deviation(std::vector<float>& magnitudes) {
-    return std::min({median_deviation(magnitudes), quartile_deviation(magnitudes),
-                     quantile_deviation(magnitudes, 10, tenth_magnitude)});
+double median_deviation(const float* magnitudes, std::size_t count) {
+    return count == 0 ? 0 : static_cast<double>(ranked(magnitudes, count, count / 2)) / median_magnitude;
+}
+
+double normal_deviation(const float* magnitudes, std::size_t count) {
+    if (count == 0) return 0;
+    const Histogram histogram(magnitudes, count);
+    return std::min({static_cast<double>(histogram.value(count / 2)) / median_magnitude,
+                     static_cast<double>(histogram.value(count / 4)) / quarter_magnitude,
+                     static_cast<double>(histogram.value(count / 10)) / tenth_magnitude});
 }
 
 }  // namespace rangeedge
