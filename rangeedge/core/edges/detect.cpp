@@ -91,7 +91,7 @@ private:
         const ShadowStep step = step_across_shadow(line, f, g, before, after, options_.spaced);
         if (!is_jump(line, before, after, step.difference, step.difference / step.deviation)) return {};
         Candidate c{};
-        c.jump = within_range(step.jump);
+        c.jump = within_range(std::min(step.jump, largest_jump(line, before, after)));
         c.significance = std::min(static_cast<float>(step.difference / step.deviation), endless);
         c.kind = static_cast<std::uint8_t>(jump_bit | (step.before_nearer ? occluding_bit : occluded_bit));
         locate(c, line, {before, after, 0, step.before_nearer ? before + 0.5 : after - 0.5, 0, false});
@@ -114,7 +114,7 @@ private:
         const EdgeSide f1 = options_.endpoint ? from_endpoint(line, f, edge.before, x) : at_midpoint(line, f, x);
         const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_midpoint(line, g, x);
         double jump = edge.intersects ? 0 : jump_strength(line, f1, f2);
-        if (jump > 0) jump = std::min(jump, largest_jump(line, f, g, edge.before, edge.after));
+        if (jump > 0) jump = std::min(jump, largest_jump(line, edge.before, edge.after));
         double crease = crease_strength(f1, f2);
 
         const double sigma = line.sigma_between(edge.before, edge.after);
