@@ -289,8 +289,8 @@ def edgeStrength(
         Angle in degrees, 0 where there is no candidate.
     kind : ndarray of shape (H, W), CV_8U
         EDGE_JUMP where the step exceeds the noise, with EDGE_OCCLUDING on its nearer side and EDGE_OCCLUDED on its
-        farther one; elsewhere EDGE_CONVEX or EDGE_CONCAVE of the largest crease, convex of equal ones; EDGE_BOUNDARY beside
-        invalid pixels, whether there is an edge or not.
+        farther one; elsewhere EDGE_CONVEX or EDGE_CONCAVE of the largest crease, convex of equal ones; EDGE_BOUNDARY
+        beside invalid pixels, whether there is an edge or not.
     significance : ndarray of shape (H, W), CV_32F
         Strength over its standard deviation, joined with that of neighbouring candidates of the same kind.
 
