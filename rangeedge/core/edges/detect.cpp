@@ -63,8 +63,8 @@ private:
             return measure_outline(line, a.curves[i], a.curves[i + 1], left.last, right.first);
         }
         if (gap > 0 && shorter < 2) return {};  // a single sample tells nothing of what is beyond a gap
-        const Position edge = adapted_position(line, a, i, options_.max_shift);     // paper, 4.2, Fig. 5
-        return measure(line, a.curves[i], a.curves[i + 1], edge, gap + 1);  // paper, 4.2, Fig. 4
+        const Position edge = adapted_position(line, a, i, options_.max_shift);  // paper, 4.2, Fig. 5
+        return measure(line, a.curves[i], a.curves[i + 1], edge, gap + 1);       // paper, 4.2, Fig. 4
     }
 
     // The jump of a smeared step after segment i; `smeared` receives its pixels. Returns the segment on its other side,
@@ -133,7 +133,8 @@ private:
         c.crease = static_cast<float>(crease);
         const double significance = jump > 0 ? std::max(of_jump, of_crease) : of_crease;
         c.significance = std::min(static_cast<float>(significance), endless);
-        if (jumps) c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
+        if (jumps)
+            c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
         if (crease > 0) c.kind |= is_convex(f1, f2) ? convex_bit : concave_bit;
         locate(c, line, edge);
         c.sides[0] = side(line, f1);

@@ -76,9 +76,9 @@ double largest_jump(const Line<T>& line, int before, int after) {
     return farthest - nearest;
 }
 
-// Whether the samples from `before` to `after` and two on either side run on too smoothly for a step of that size, which
-// curves that do not quite follow them pretend; not where one of them has no data. A sharp step has third differences of twice its size, an even ramp over n
-// samples of step / 2n.
+// Whether the samples from `before` to `after` and two on either side run on too smoothly for a step of that size, such
+// as curves pretend that do not quite follow them; not where one has no data. A sharp step has third differences of
+// twice its size, an even ramp over n samples of step / 2n.
 template <class T>
 bool is_smooth(const Line<T>& line, int before, int after, int n, double step) {
     const int first = std::max(before - 2, 0), last = std::min(after + 2, line.path.size - 1);
