@@ -414,7 +414,7 @@ def kernel_options(params: ScanLineParams, frame: RangeFrame) -> _core.ScanLineO
         max_gap=params.maxGap,
         max_smear=params.maxSmear,
         shadows=params.shadowEdges,
-        spaced=params.K is not None or params.pixelSize is not None or frame.samples.ndim == 3,
+        spaced=frame.spaced,
         merge_significance=params.mergeSignificance,
         min_significance=params.minSignificance,
     )

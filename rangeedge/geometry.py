@@ -59,6 +59,11 @@ class RangeFrame:
         """Distance along the viewing axis, NaN where invalid."""
         return 1 / self.ordinate if self.projective else -self.ordinate
 
+    @property
+    def spaced(self) -> bool:
+        """Whether the spacing of pixels is known as a length; on a grid 1 stands for unknown."""
+        return self.projective or self.samples.ndim == 3 or self.to_plane != RangeFrame.to_plane
+
     def kernel(self, noise: _core.Noise) -> _core.Frame:
         """The image and its noise as every kernel takes it."""
         return _core.Frame(self.samples, self.projective, self.to_plane, self.axis, noise)

@@ -318,7 +318,7 @@ class Image:
     @property
     def spaced(self):
         """Whether the spacing of pixels is known as a length."""
-        return self.K is not None or self.spacing is not None or self.data.ndim == 3
+        return self.projective or self.spacing not in (None, (1.0, 1.0)) or self.data.ndim == 3
 
     @property
     def z_sign(self):

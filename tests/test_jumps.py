@@ -15,6 +15,7 @@ from rangeedge import (
     detectEdges,
     edgePoints,
     edgeStrength,
+    segmentRegions,
 )
 
 K = np.array([[250.0, 0, 59.5], [0, 250, 39.5], [0, 0, 1]])
@@ -289,3 +290,15 @@ def test_smooth_surfaces_have_no_edges(surface, dtype):
     # A step on it is found, apart from places where it makes a terrace of a slope.
     stepped = z + np.where(U > 70, 0.2 * np.ptp(z), 0)
     assert detectEdges(stepped.astype(dtype), **geometry)[10:70, 68:73].any(axis=1).mean() > 0.85
+
+
+# Regions see the same edges.
+
+
+def test_regions_grow_from_the_edges_that_the_detector_finds():
+    # A slanted face of five pixels, wide enough in space: without the camera it would be smear.
+    z = 1.0 + np.clip(U - 58.5, 0, 5) * 0.02 / 5
+    z = noisy(z, 0.00005)
+    edges = detectEdges(z, K=K)
+    assert edges.any()
+    assert np.array_equal(segmentRegions(z, K=K), segmentRegions(z, K=K, edges=edges))
