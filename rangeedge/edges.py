@@ -162,7 +162,10 @@ def edgeStrength(
         jump = |z1(x) - z2(x)|,  crease = the angle between the normals of f1 and f2 at x,
 
     x being the position of the edge; it is their intersection where the pixels allow that, and then jump = 0
-    (paper, 4.2). Both pixels beside the cut receive the strengths, and of several candidates the largest.
+    (paper, 4.2). Both pixels beside the cut receive the strengths, and of several candidates the largest. Surfaces either
+    meet at a pixel or do not: a jump pixel has no crease, and of candidates for both the most significant decides.
+    A step that is smeared over up to `maxSmear` pixels is one jump of its full height between the pixels beside them
+    (`flyingPixels`). No jump exceeds the depths of the pixels around it.
 
     Parameters
     ----------
@@ -184,8 +187,8 @@ def edgeStrength(
         Angle in degrees, 0 where there is no candidate.
     kind : ndarray of shape (H, W), CV_8U
         EDGE_JUMP where the step exceeds the noise, with EDGE_OCCLUDING on its nearer side and EDGE_OCCLUDED on its
-        farther one; EDGE_CONVEX or EDGE_CONCAVE of the largest crease, convex of equal ones; EDGE_BOUNDARY beside
-        invalid pixels, whether there is an edge or not.
+        farther one; elsewhere EDGE_CONVEX or EDGE_CONCAVE of the largest crease, convex of equal ones; EDGE_BOUNDARY
+        beside invalid pixels, whether there is an edge or not.
     significance : ndarray of shape (H, W), CV_32F
         Strength over its standard deviation, joined with that of neighbouring candidates of the same kind.
 

@@ -40,7 +40,7 @@ def flyingPixels(
 
     Ramps have up to `maxSmear` pixels, and steps between these that are not too uneven. They count only if they meet
     the viewing ray at less than 20 degrees, at which a surface would hardly be seen, or at less than 45 degrees where
-    they have no more than two pixels; without `K`, `pixelSize` or points there are no such angles, and all count.
+    they have no more than two pixels; on a grid of `pixelSize` 1, as None is, there are no such angles, and all count.
     `edgeStrength` has no creases on these pixels, and one jump of the full height across them.
 
     Parameters

@@ -318,7 +318,7 @@ class Image:
     @property
     def spaced(self):
         """Whether the spacing of pixels is known as a length."""
-        return self.K is not None or self.spacing is not None or self.data.ndim == 3
+        return self.projective or self.spacing not in (None, (1.0, 1.0)) or self.data.ndim == 3
 
     @property
     def z_sign(self):
@@ -590,7 +590,9 @@ class Detector:
             x=u + sample * dx,
             y=v + sample * dy,
             shift=0.0,
-            jump=min(abs(line.height(y) - line.height(other)) for other in (below, y_far)),
+            jump=min(
+                _range_around(line, a, b), *(abs(line.height(y) - line.height(other)) for other in (below, y_far))
+            ),
             crease=0.0,
             significance=significance,
             kind=EDGE_JUMP | (EDGE_OCCLUDING if first else EDGE_OCCLUDED),
@@ -640,11 +642,7 @@ class Detector:
             mf, mg = left.curve.slope(x), right.curve.slope(x)
         height = line.height
         jump = 0.0 if meets else abs(height(yf) - height(yg))
-        ends = float(line.x[before]), float(line.x[after])
-        ahead = min((ends[1] - ends[0]) / (after - before), (ends[1] - ends[0]) / 2)
-        inside = height(left.curve.value(ends[0] - ahead)), height(right.curve.value(ends[1] + ahead))
-        ends = height(left.curve.value(ends[0])), height(right.curve.value(ends[1]))
-        jump = min(jump, abs(ends[0] - ends[1]) + abs(ends[0] - inside[0]) + abs(ends[1] - inside[1]))
+        jump = min(jump, _range_around(line, before, after))
         bend = line.crease(xf, (zf, mf), xg, (zg, mg))
         sigma = (line.sigma[before] + line.sigma[after]) / 2
         jump_deviation = sigma * math.sqrt(left.curve.value_variance(xf) + right.curve.value_variance(xg))
@@ -687,6 +685,12 @@ class Detector:
             along=along / unit,
             sides=[(value, slope / unit, variance / unit**2) for value, slope, variance in sides],
         )
+
+
+def _range_around(line, before, after):
+    """Of the depths of two samples on either side of an edge."""
+    around = [line.height(float(line.y[k])) for k in (before - 1, before, after, after + 1) if 0 <= k < len(line.y)]
+    return np.nanmax(around) - np.nanmin(around)
 
 
 def _deviations(f, g, x):

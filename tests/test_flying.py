@@ -46,7 +46,9 @@ def test_a_slanted_face_of_a_few_pixels_is_a_surface_where_it_is_wide_enough_in_
     ramp = np.clip((U - 58.5) / 5, 0, 1)
     assert not flyingPixels(1 + 0.02 * ramp, K=K, noise=0.0001).any()  # 5 px of 4 mm: 45 degrees
     assert flyingPixels(1 + 0.2 * ramp, K=K, noise=0.0001)[:, 60:62].all()
-    assert flyingPixels(1 + 0.02 * ramp, noise=0.0001)[:, 60:62].all()  # no scale, no angle
+    for unknown in ({}, {"pixelSize": 1}):  # no scale, no angle
+        assert flyingPixels(1 + 0.02 * ramp, noise=0.0001, **unknown)[:, 60:62].all()
+    assert not flyingPixels(1 + 0.02 * ramp, noise=0.0001, pixelSize=0.004).any()
 
 
 def test_thin_objects_are_none():

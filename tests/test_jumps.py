@@ -12,10 +12,14 @@ from rangeedge import (
     EDGE_JUMP,
     EDGE_OCCLUDED,
     EDGE_OCCLUDING,
+    ScanLineParams,
     detectEdges,
     edgePoints,
     edgeStrength,
 )
+from rangeedge.detector import found_edges
+from rangeedge.edges import frame_of
+from rangeedge.selection import Selection
 
 K = np.array([[250.0, 0, 59.5], [0, 250, 39.5], [0, 0, 1]])
 V, U = np.indices((80, 120)).astype(float)
@@ -289,3 +293,16 @@ def test_smooth_surfaces_have_no_edges(surface, dtype):
     # A step on it is found, apart from places where it makes a terrace of a slope.
     stepped = z + np.where(U > 70, 0.2 * np.ptp(z), 0)
     assert detectEdges(stepped.astype(dtype), **geometry)[10:70, 68:73].any(axis=1).mean() > 0.85
+
+
+# The geometry is the frame's.
+
+
+def test_a_frame_has_the_same_edges_without_the_parameters_that_made_it():
+    # A slanted face of five pixels, wide enough in space: without the camera it would be smear.
+    z = noisy(1.0 + np.clip(U - 58.5, 0, 5) * 0.02 / 5, 0.00005)
+    frame = frame_of("test", z, ScanLineParams(K=K), None)
+    found = found_edges("test", frame, ScanLineParams(noise=0.00005), Selection().checked("test"))
+    assert found.thin.any()
+    assert np.array_equal(found.thin, detectEdges(z, K=K, noise=0.00005))
+    assert not np.array_equal(found.thin, detectEdges(z, noise=0.00005))

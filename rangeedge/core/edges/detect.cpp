@@ -63,8 +63,8 @@ private:
             return measure_outline(line, a, i, i + 1, left.last, right.first);
         }
         if (gap > 0 && shorter < 2) return {};  // a single sample tells nothing of what is beyond a gap
-        const Position edge = adapted_position(line, a, i, options_.max_shift);     // paper, 4.2, Fig. 5
-        return measure(line, a, i, i + 1, edge, gap + 1);                           // paper, 4.2, Fig. 4
+        const Position edge = adapted_position(line, a, i, options_.max_shift);  // paper, 4.2, Fig. 5
+        return measure(line, a, i, i + 1, edge, gap + 1);                        // paper, 4.2, Fig. 4
     }
 
     // The jump of a smeared step after segment i; `smeared` receives its pixels. Returns the segment on its other side,
@@ -91,7 +91,7 @@ private:
         const ShadowStep step = step_across_shadow(line, a.fit(i), a.fit(j), before, after, options_.spaced);
         if (!is_jump(line, before, after, step.difference, step.difference / step.deviation)) return {};
         Candidate c{};
-        c.jump = within_range(step.jump);
+        c.jump = within_range(std::min(step.jump, largest_jump(line, before, after)));
         c.significance = std::min(static_cast<float>(step.difference / step.shared_deviation), endless);
         c.kind = static_cast<std::uint8_t>(jump_bit | (step.before_nearer ? occluding_bit : occluded_bit));
         locate(c, line, {before, after, 0, step.before_nearer ? before + 0.5 : after - 0.5, 0, false});
@@ -116,7 +116,7 @@ private:
         const EdgeSide f1 = options_.endpoint ? from_endpoint(line, f, edge.before, x) : at_midpoint(line, f, x);
         const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_midpoint(line, g, x);
         double jump = edge.intersects ? 0 : jump_strength(line, f1, f2);
-        if (jump > 0) jump = std::min(jump, largest_jump(line, f, g, edge.before, edge.after));
+        if (jump > 0) jump = std::min(jump, largest_jump(line, edge.before, edge.after));
         double crease = crease_strength(f1, f2);
 
         const int n1 = a.segments[i].size(), n2 = a.segments[j].size();
@@ -142,7 +142,8 @@ private:
         c.crease = static_cast<float>(crease);
         const double significance = jump > 0 ? std::max(jump_significance, crease_significance) : crease_significance;
         c.significance = std::min(static_cast<float>(significance), endless);
-        if (jumps) c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
+        if (jumps)
+            c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
         if (crease > 0) c.kind |= is_convex(f1, f2) ? convex_bit : concave_bit;
         locate(c, line, edge);
         c.sides[0] = side(line, f1, slope1.single);

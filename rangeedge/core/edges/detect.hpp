@@ -17,8 +17,8 @@
 
 namespace rangeedge {
 
-// All candidates, by their place in the image; the same for any number of threads. `smeared`, unless null, becomes 255 at
-// pixels over which a step is smeared (smear.hpp); it holds zeros before.
+// All candidates, by their place in the image; the same for any number of threads. `smeared`, unless null, becomes 255
+// at pixels over which a step is smeared (smear.hpp); it holds zeros before.
 template <class T>
 std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, int threads,
                                        std::uint8_t* smeared = nullptr);

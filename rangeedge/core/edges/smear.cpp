@@ -37,7 +37,8 @@ double share_of_step(const Line<T>& line, const EndTangent& f, const EndTangent&
 }  // namespace
 
 template <class T>
-SmearedStep smeared_step(const Line<T>& line, const Approximation& a, std::ptrdiff_t i, const ScanLineOptions& options) {
+SmearedStep smeared_step(const Line<T>& line, const Approximation& a, std::ptrdiff_t i,
+                         const ScanLineOptions& options) {
     const SmearedStep none{0, 0, i, 0};
     if (a.segments[i].size() <= options.max_smear) return none;
     std::ptrdiff_t next = i + 1;

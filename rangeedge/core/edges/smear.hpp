@@ -36,8 +36,8 @@ SmearedStep smeared_step(const Line<T>& line, const Approximation& a, std::ptrdi
 // samples there, with creases at its ends.
 class SmearMask {
 public:
-    // From the pixels that lines find. Those count that, together with the eight around them, are found `least` times: a
-    // smeared step goes on from line to line.
+    // From the pixels that lines find. Those count that, together with the eight around them, are found `least` times:
+    // a smeared step goes on from line to line.
     SmearMask(int rows, int cols, const std::vector<std::int32_t>& found, int least);
 
     // Removes jumps whose nearer side is smeared, and creases of which a pixel is smeared or beside one that is.

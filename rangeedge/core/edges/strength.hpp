@@ -80,15 +80,18 @@ double jump_strength(const Line<T>& line, const EdgeSide& f1, const EdgeSide& f2
     return std::abs(line.depth(f1.ordinate) - line.depth(f2.ordinate));
 }
 
-// No more than the difference of the depths at the end points, and what either curve adds to them on the way to x, which
-// is no more than it changes over the last sample before. Over a wide gap, or close to the horizon, a curve runs away.
+// The difference of depths between the samples around an edge, two on either side where there are. No jump is larger:
+// over a wide gap, of few samples or close to the horizon, a curve runs away.
 template <class T>
-double largest_jump(const Line<T>& line, const Curve& f1, const Curve& f2, int before, int after) {
-    const double x1 = line.abscissa(before), x2 = line.abscissa(after);
-    const double z1 = line.depth(f1.value(x1)), z2 = line.depth(f2.value(x2));
-    const double way = std::min((x2 - x1) / (after - before), (x2 - x1) / 2);
-    return std::abs(z1 - z2) + std::abs(z1 - line.depth(f1.value(x1 - way))) +
-           std::abs(z2 - line.depth(f2.value(x2 + way)));
+double largest_jump(const Line<T>& line, int before, int after) {
+    double nearest = HUGE_VAL, farthest = -HUGE_VAL;
+    for (const int k : {before - 1, before, after, after + 1}) {
+        if (k < 0 || k >= line.path.size) continue;
+        const double z = line.depth(line.ordinate(k));
+        if (z < nearest) nearest = z;
+        if (z > farthest) farthest = z;
+    }
+    return farthest - nearest;
 }
 
 // The largest third difference of the samples from `before` to `after` and `margin` on either side; infinite where one of

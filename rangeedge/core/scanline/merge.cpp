@@ -107,8 +107,8 @@ typename Merger<T, List>::Sides Merger<T, List>::sides_without(int i, const Arra
 template <class T, class List>
 bool Merger<T, List>::cheapest_bridge(int i) {
     const int before = previous(i), after = next(i);
-    return cost(i) < HUGE_VAL && cost(i) < cost(before) && cost(i) < cost(previous(before)) &&
-           cost(i) <= cost(after) && cost(i) <= cost(next(after));
+    return cost(i) < HUGE_VAL && cost(i) < cost(before) && cost(i) < cost(previous(before)) && cost(i) <= cost(after) &&
+           cost(i) <= cost(next(after));
 }
 
 template <class T, class List>
