@@ -83,7 +83,7 @@ public:
 private:
     // The parts of those blocks that have a say in the tile.
     void expand(int level, const Tile& tile, std::vector<int>& groups) {
-        constexpr std::size_t many = 64;
+        constexpr std::size_t many = 16;
         const Candidates& from = blocks_[at(level)];
         const Blocks& blocks = tree_.levels[at(level)];
         lower_.resize(at(from.count()));
@@ -169,13 +169,17 @@ private:
     }
 
     // The nearest of the contenders whose w d^2 is at most about `close`, of the lowest label among equals.
-    int nearest_exactly(double row, double col, float close) const {
-        const double limit = double(close) * (1.0 + double(slack));
+    int nearest_exactly(double row, double col, float close) {
+        const float limit = close * (1.0f + slack);
+        const int count = static_cast<int>(contenders_.size());
+        lower_.resize(contenders_.size());
+        measure(count, weight_.data(), x_.data(), y_.data(), static_cast<float>(row), static_cast<float>(col), aspect_,
+                lower_.data());
         int best = -1;
         double best_squared = 0.0;
-        for (int i = 0; i < static_cast<int>(contenders_.size()); ++i) {
+        for (int i = 0; i < count; ++i) {
+            if (lower_[at(i)] > limit) continue;
             const double squared = squared_distance(i, row, col);
-            if (double(weight_[at(i)]) * squared > limit) continue;
             const auto nearer = [&](const Source& source, const Source& than) {
                 const int sign = compare_exactly(squared, source.level, best_squared, than.level);
                 return sign < 0 || (sign == 0 && source.label < than.label);

@@ -149,4 +149,12 @@ RANGEEDGE_WIDE void compare(int count, const float* weight, const float* x, cons
     }
 }
 
+RANGEEDGE_WIDE void measure(int count, const float* weight, const float* x, const float* y, float row, float col,
+                            float aspect, float* value) {
+    for (int i = 0; i < count; ++i) {
+        const float dx = col - x[i], dy = row - y[i];
+        value[i] = weight[i] * (dx * dx + aspect * (dy * dy));
+    }
+}
+
 }  // namespace rangeedge

@@ -83,4 +83,8 @@ void exceed_as_planes(const Candidates& blocks, const PivotPlane& pivot, const T
 void compare(int count, const float* weight, const float* x, const float* y, const Tile& tile, float aspect,
              float* least, std::int32_t* number, float* second);
 
+// w d^2 of every source at one pixel.
+void measure(int count, const float* weight, const float* x, const float* y, float row, float col, float aspect,
+             float* value);
+
 }  // namespace rangeedge
