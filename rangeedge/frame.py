@@ -25,7 +25,7 @@ class Frame:
     `samples` holds inverse depth (`projective`) or height of shape (H, W), or points of shape (H, W, 3).
     `to_plane` takes (column, row, 1) to normalised image coordinates or to lengths; `axis` is the viewing direction;
     `heightMap` says that heights grow toward the viewer in the image, too; `spaced` that the spacing of pixels is known
-    in the unit of the values. `step` is the length to whose multiples the values were rounded, 0 if none is known.
+    in the unit of the values, which on a grid 1 does not say. `step` is the length to whose multiples the values were rounded, 0 if none is known.
     `noise` is a model or a map of deviations.
     """
 
@@ -185,8 +185,8 @@ def _grid(
         height = height.copy() if np.shares_memory(height, src) else height
         height[~inside] = np.nan
     dx, dy = pixelSize or (1.0, 1.0)
-    frame = Frame(height, False, (dx, 0.0, 0.0, 0.0, dy, 0.0), heightMap=heightMap, spaced=pixelSize is not None)
-    return replace(frame, step=_step(src, depthFactor))
+    to_plane, spaced = (dx, 0.0, 0.0, 0.0, dy, 0.0), (dx, dy) != (1.0, 1.0)
+    return Frame(height, False, to_plane, heightMap=heightMap, spaced=spaced, step=_step(src, depthFactor))
 
 
 def _points(src: np.ndarray, inside: np.ndarray | None, heightMap: bool) -> Frame:

@@ -17,9 +17,9 @@ from rangeedge import (
     edgePoints,
     edgeStrength,
 )
-from rangeedge.detector import found_edges
-from rangeedge.edges import frame_of
-from rangeedge.selection import Selection
+from rangeedge.detector import run_detector
+from rangeedge.frame import read_frame
+from rangeedge.options import Selection
 
 K = np.array([[250.0, 0, 59.5], [0, 250, 39.5], [0, 0, 1]])
 V, U = np.indices((80, 120)).astype(float)
@@ -301,8 +301,8 @@ def test_smooth_surfaces_have_no_edges(surface, dtype):
 def test_a_frame_has_the_same_edges_without_the_parameters_that_made_it():
     # A slanted face of five pixels, wide enough in space: without the camera it would be smear.
     z = noisy(1.0 + np.clip(U - 58.5, 0, 5) * 0.02 / 5, 0.00005)
-    frame = frame_of("test", z, ScanLineParams(K=K), None)
-    found = found_edges("test", frame, ScanLineParams(noise=0.00005), Selection().checked("test"))
-    assert found.thin.any()
-    assert np.array_equal(found.thin, detectEdges(z, K=K, noise=0.00005))
-    assert not np.array_equal(found.thin, detectEdges(z, noise=0.00005))
+    frame = read_frame(z, ScanLineParams(K=K)).with_noise(0.00005)
+    edges, _ = run_detector(frame, ScanLineParams(), Selection())
+    assert edges.any()
+    assert np.array_equal(edges, detectEdges(z, K=K, noise=0.00005))
+    assert not np.array_equal(edges, detectEdges(z, noise=0.00005))

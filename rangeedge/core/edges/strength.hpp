@@ -111,10 +111,13 @@ double largest_third_difference(const Line<T>& line, int before, int after, int 
 }
 
 // Whether samples run on too smoothly for a step of that size, which curves that do not quite follow them pretend. A
-// sharp step has third differences of twice its size, an even ramp over n samples of step / 2n.
+// sharp step has third differences of twice its size, an even ramp over n samples of step / 2n. At the end of a line
+// half of them are to be seen.
 template <class T>
 bool is_smooth(const Line<T>& line, int before, int after, int n, double step) {
-    return largest_third_difference(line, before, after, 2) < step / (2.5 * n - 1.5);
+    constexpr int reach = 2;
+    const bool whole = before >= reach && after + reach < line.path.size;
+    return largest_third_difference(line, before, after, reach) < (whole ? 1 : 0.5) * step / (2.5 * n - 1.5);
 }
 
 // The same for a change of slope, from one sample to the next. A sharp one has a third difference of at least half its
