@@ -53,6 +53,15 @@ public:
         for (std::size_t i = 1; i < 4; ++i)
             for (std::size_t b = 0; b < buckets; ++b) counts_[0][b] += counts_[i][b];
     }
+    // The least value of the bucket of a rank, and the value of the rank.
+    float at_least(std::size_t rank) const {
+        std::size_t b = 0;
+        for (; counts_[0][b] <= rank; ++b) rank -= counts_[0][b];
+        const auto bits = static_cast<std::uint32_t>(b << dropped_bits);
+        float least;
+        std::memcpy(&least, &bits, sizeof least);
+        return least;
+    }
     float value(std::size_t rank) const {
         const Place place = find(rank);
         return place.within[place.rank];
@@ -111,6 +120,13 @@ float ranked(const float* magnitudes, std::size_t count, std::size_t rank) {
     return Histogram(magnitudes, count).value(rank);
 }
 
+std::vector<float> ranked(const float* magnitudes, std::size_t count, const std::vector<std::size_t>& ranks) {
+    const Histogram histogram(magnitudes, count);
+    std::vector<float> values;
+    for (const std::size_t rank : ranks) values.push_back(histogram.value(rank));
+    return values;
+}
+
 double quartile_deviation(const float* magnitudes, std::size_t count) {
     return count == 0 ? 0 : static_cast<double>(ranked(magnitudes, count, count / 4)) / quarter_magnitude;
 }
@@ -118,8 +134,11 @@ double quartile_deviation(const float* magnitudes, std::size_t count) {
 double median_deviation(const float* magnitudes, std::size_t count) {
     if (count == 0) return 0;
     const Histogram histogram(magnitudes, count);
-    return std::min(static_cast<double>(histogram.value(count / 2)) / median_magnitude,
-                    quarter_excess * static_cast<double>(histogram.value(count / 4)) / quarter_magnitude);
+    const double by_median = static_cast<double>(histogram.value(count / 2)) / median_magnitude;
+    const auto most = [](float quartile) { return quarter_excess * static_cast<double>(quartile) / quarter_magnitude; };
+    // Mostly the quartile need not be known exactly.
+    return most(histogram.at_least(count / 4)) >= by_median ? by_median
+                                                            : std::min(by_median, most(histogram.value(count / 4)));
 }
 
 }  // namespace rangeedge
