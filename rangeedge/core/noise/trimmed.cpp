@@ -53,6 +53,7 @@ public:
         for (std::size_t i = 1; i < 4; ++i)
             for (std::size_t b = 0; b < buckets; ++b) counts_[0][b] += counts_[i][b];
     }
+    // The value of a rank, 0 being that of the smallest.
     float value(std::size_t rank) const {
         const Place place = find(rank);
         return place.within[place.rank];
@@ -109,6 +110,13 @@ double trimmed_deviation(const float* magnitudes, std::size_t count) {
 
 float ranked(const float* magnitudes, std::size_t count, std::size_t rank) {
     return Histogram(magnitudes, count).value(rank);
+}
+
+std::vector<float> ranked(const float* magnitudes, std::size_t count, const std::vector<std::size_t>& ranks) {
+    const Histogram histogram(magnitudes, count);
+    std::vector<float> values;
+    for (const std::size_t rank : ranks) values.push_back(histogram.value(rank));
+    return values;
 }
 
 double quartile_deviation(const float* magnitudes, std::size_t count) {

@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstddef>
+#include <vector>
 
 namespace rangeedge {
 
-// The value of a rank among magnitudes, 0 being that of the smallest. `padding` more values than `count` may be read
-// here and below.
+// The value of a rank, or of several, among magnitudes, 0 being that of the smallest. `padding` more values than
+// `count` may be read here and below.
 float ranked(const float* magnitudes, std::size_t count, std::size_t rank);
+std::vector<float> ranked(const float* magnitudes, std::size_t count, const std::vector<std::size_t>& ranks);
 
 // The deviation of normal values around 0, given their magnitudes: the root mean square of the smallest three quarters,
 // corrected for the trimming. 0 of none.
