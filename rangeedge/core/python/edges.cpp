@@ -88,8 +88,8 @@ Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOpti
     return columns(candidates);
 }
 
-void bound_keep_lines(const Image<std::uint8_t>& edges, int min_length, const Image<float>& significance, float min_peak,
-                      const OutImage<std::uint8_t>& kept) {
+void bound_keep_lines(const Image<std::uint8_t>& edges, int min_length, const Image<float>& significance,
+                      float min_peak, const OutImage<std::uint8_t>& kept) {
     keep_lines(edges.data(), rows(edges), cols(edges), min_length, significance.data(), min_peak, kept.data());
 }
 
