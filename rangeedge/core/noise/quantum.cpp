@@ -10,7 +10,7 @@
 namespace rangeedge {
 namespace {
 
-constexpr int looked_at = 44;              // rows, and columns, of which each pixel of both is looked at
+constexpr int looked_at = 32;              // rows, and columns, of which each pixel of both is looked at
 constexpr std::size_t fewest_levels = 16;  // that values take
 constexpr double coarsest = 0.01;          // of a distance: no step is larger
 constexpr int most_parts = 3;
