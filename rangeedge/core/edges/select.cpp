@@ -25,7 +25,8 @@ void keep_lines(const std::uint8_t* edges, int rows, int cols, int min_length, c
             left = std::min(left, parts.col_of(begin)), right = std::max(right, parts.col_of(end - 1));
             top = std::min(top, parts.row_of(begin)), bottom = std::max(bottom, parts.row_of(begin));
             if (!significance) continue;
-            const float* first = significance + static_cast<std::size_t>(parts.row_of(begin)) * width + parts.col_of(begin);
+            const float* first =
+                significance + static_cast<std::size_t>(parts.row_of(begin)) * width + parts.col_of(begin);
             peak = std::max(peak, *std::max_element(first, first + (end - begin)));
         }
         if (!(peak >= min_peak)) continue;
