@@ -20,7 +20,7 @@ constexpr double quarter_magnitude = 0.31864;  // the lower quartile of its magn
 constexpr double tenth_magnitude = 0.12566;    // and their lowest tenth
 constexpr double quarter_spread = 1.8;         // of that quartile of n values, as a part of it, times the root of n
 constexpr double tenth_spread = 3;
-constexpr int dropped_bits = 20;               // of a float that its bucket does not tell: 8 buckets an octave are left
+constexpr int dropped_bits = 20;  // of a float that its bucket does not tell: 8 buckets an octave are left
 
 // The sum of the squares of values whose bits, as an integer, are below a limit.
 template <int bytes>
