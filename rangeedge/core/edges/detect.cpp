@@ -117,17 +117,19 @@ private:
                       const Position& edge, int steps) const {
         const Curve &f = a.curves[i], &g = a.curves[j];
         const double x = edge.abscissa;
-        const EdgeSide f1 = options_.endpoint ? from_endpoint(line, f, edge.before, x) : at_midpoint(line, f, x);
-        const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_midpoint(line, g, x);
+        const EdgeSide f1 = options_.endpoint ? from_endpoint(line, f, edge.before, x) : at_position(line, f, x);
+        const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_position(line, g, x);
         double jump = edge.intersects ? 0 : jump_strength(line, f1, f2);
         if (jump > 0) jump = std::min(jump, largest_jump(line, edge.before, edge.after));
         double crease = crease_strength(f1, f2);
 
         const int n1 = a.segments[i].size(), n2 = a.segments[j].size();
-        const FitDeviation slope1 = slope_deviation(line, edge.before, n1, f1.slope_variance);
-        const FitDeviation slope2 = slope_deviation(line, edge.after, n2, f2.slope_variance);
-        const FitDeviation of_jump = jump_deviation(value_deviation(line, edge.before, n1, f1.value_variance),
-                                                    value_deviation(line, edge.after, n2, f2.value_variance));
+        const FitNoise& noise = *line.noise;
+        const double sigma1 = line.noise_at(edge.before).of_fit(n1), sigma2 = line.noise_at(edge.after).of_fit(n2);
+        const FitDeviation slope1 = slope_deviation(noise, sigma1, n1, f1.slope_variance);
+        const FitDeviation slope2 = slope_deviation(noise, sigma2, n2, f2.slope_variance);
+        const FitDeviation of_jump = jump_deviation(value_deviation(noise, sigma1, n1, f1.value_variance),
+                                                    value_deviation(noise, sigma2, n2, f2.value_variance));
         const FitDeviation of_crease = crease_deviation(f1, slope1, f2, slope2);
         const double difference = std::abs(f1.ordinate - f2.ordinate);
         double jump_significance = difference / of_jump.shared, crease_significance = crease / of_crease.shared;

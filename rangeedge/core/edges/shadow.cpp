@@ -38,9 +38,10 @@ ShadowStep step_across_shadow(const Line<T>& line, const Fit& f, const Fit& g, i
     step.jump = std::min(line.depth(beyond), line.depth(below)) - line.depth(end);
     step.difference = end - std::max(beyond, below);
     if (!spaced) step.difference = std::min(step.difference, Extension(near, x_near, x_far).lower - beyond);
-    const FitDeviation deviation =
-        jump_deviation(value_deviation(line, before, f.samples, f.curve.value_variance(x_near)),
-                       value_deviation(line, after, g.samples, g.curve.value_variance(x_near)));
+    const FitDeviation deviation = jump_deviation(value_deviation(*line.noise, line.noise_at(before).of_fit(f.samples),
+                                                                  f.samples, f.curve.value_variance(x_near)),
+                                                  value_deviation(*line.noise, line.noise_at(after).of_fit(g.samples),
+                                                                  g.samples, g.curve.value_variance(x_near)));
     step.deviation = deviation.single, step.shared_deviation = deviation.shared;
     return step;
 }

@@ -40,28 +40,27 @@ struct FitDeviation {
     double single, shared;
 };
 
-// Of the slope and of the value of a fit to n samples beside sample k, by their variances for white noise of unit
+// Of the slope and of the value of a fit to n samples with noise of `sigma`, by their variances for white noise of unit
 // variance.
-template <class T>
-FitDeviation slope_deviation(const Line<T>& line, int k, int n, double variance) {
-    const double white = line.noise_at(k).of_fit(n) * std::sqrt(variance);
-    return {line.noise->slope[n] * white, line.noise->shared_slope[n] * white};
+inline FitDeviation slope_deviation(const FitNoise& noise, double sigma, int n, double variance) {
+    const double white = sigma * std::sqrt(variance);
+    return {noise.slope[n] * white, noise.shared_slope[n] * white};
 }
-template <class T>
-FitDeviation value_deviation(const Line<T>& line, int k, int n, double variance) {
-    const double white = line.noise_at(k).of_fit(n) * std::sqrt(variance);
-    return {line.noise->value[n] * white, line.noise->shared_value[n] * white};
+inline FitDeviation value_deviation(const FitNoise& noise, double sigma, int n, double variance) {
+    const double white = sigma * std::sqrt(variance);
+    return {noise.value[n] * white, noise.shared_value[n] * white};
 }
 
 // First form: the curve at the position x of the edge.
 template <class T>
-EdgeSide at_midpoint(const Line<T>& line, const Curve& f, double x) {
+EdgeSide at_position(const Line<T>& line, const Curve& f, double x) {
     const double z = f.value(x), slope = f.slope(x);
     const Tangent tangent = line.tangent(x, z, slope);
     return {z, slope, tangent, f.value_variance(x), f.slope_variance(x), line.angle_per_slope(tangent, z)};
 }
 
-// Second form: extrapolated to x from an end point, the sample k, z1 + f'(x1) (x - x1).
+// Second form: extrapolated to x from an end point, the sample k, z1 + f'(x1) (x - x1), on either side. Where the edge
+// was moved it is the sample beside the edge.
 template <class T>
 EdgeSide from_endpoint(const Line<T>& line, const Curve& f, int k, double x) {
     const double x1 = line.abscissa(k), z1 = line.ordinate(k), slope = f.slope(x1);
@@ -136,14 +135,17 @@ inline double crease_strength(const EdgeSide& f1, const EdgeSide& f2) {
 // f1' > f2': on a grid, with the tangents (1, -f1') and (1, -f2'), their cross product is f1' - f2'.
 inline bool is_convex(const EdgeSide& f1, const EdgeSide& f2) { return cross(f1.tangent, f2.tangent) > 0; }
 
+inline double root_of_squares(double a, double b) { return std::sqrt(a * a + b * b); }
+
 // The standard deviations of f1(x) - f2(x), an ordinate, and of the crease in degrees, by those of values and slopes.
 inline FitDeviation jump_deviation(const FitDeviation& value1, const FitDeviation& value2) {
-    return {std::hypot(value1.single, value2.single), std::hypot(value1.shared, value2.shared)};
+    return {root_of_squares(value1.single, value2.single), root_of_squares(value1.shared, value2.shared)};
 }
 inline FitDeviation crease_deviation(const EdgeSide& f1, const FitDeviation& slope1, const EdgeSide& f2,
                                      const FitDeviation& slope2) {
     const double a1 = degrees_per_radian * f1.angle_per_slope, a2 = degrees_per_radian * f2.angle_per_slope;
-    return {std::hypot(a1 * slope1.single, a2 * slope2.single), std::hypot(a1 * slope1.shared, a2 * slope2.shared)};
+    return {root_of_squares(a1 * slope1.single, a2 * slope2.single),
+            root_of_squares(a1 * slope1.shared, a2 * slope2.shared)};
 }
 
 }  // namespace rangeedge

@@ -23,6 +23,8 @@ struct LineAndRest {
     }
 };
 
+// The coefficients c_i = sum y p_i / sum p_i^2 of the polynomials p_i of curve.hpp, which are orthogonal over the samples:
+// with those the normal equations of z = a x^2 + b x + c (paper, 4.2) fall apart. Of samples at any abscissas.
 LineAndRest fit_line(const PowerSums& sums) {
     LineAndRest fit;
     Curve& line = fit.line;
@@ -65,6 +67,7 @@ double residual_squares(const PowerSums& sums, double least) {
     return curved(sums, fit, least) ? fit.curved_squares : fit.squares;
 }
 
+// The same c_i of samples at equal distances, of images with a regular grid or a camera: the sums hold sum y p_i.
 Curve fit_least_squares(const OrthogonalSums& p, double first, double least) {
     Curve curve;
     curve.base = p.mean;

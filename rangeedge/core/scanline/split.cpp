@@ -48,7 +48,7 @@ RANGEEDGE_INLINE int first_invalid_in(const float* y, int k, int n) {
 RANGEEDGE_VERSIONS(int, first_valid, (const float* y, int k, int n), (y, k, n))
 RANGEEDGE_VERSIONS(int, first_invalid, (const float* y, int k, int n), (y, k, n))
 
-// The quadratic through both end points and the midpoint, y = ym + t (b + a t) with t counted from the midpoint.
+// The quadratic through both end points and the midpoint (paper, 4.1), y = ym + t (b + a t) with t counted from the midpoint.
 template <class T>
 struct ThreePoint {
     int m;
@@ -68,6 +68,8 @@ struct ThreePoint {
         a = (slope_right - slope_left) * inverse;
         b = (slope_left * right + slope_right * left) * inverse;
     }
+    // |y - f(x)|, that is compared with the tolerance (paper, 4.1); for samples at equal distances find_worst_of_even has
+    // it for several at once.
     T residual(T x, T y) const {
         const T t = x - origin;
         return std::abs(y - (ym + t * (b + a * t)));
