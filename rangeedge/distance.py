@@ -241,27 +241,31 @@ def salienceDistanceTransformWithLabels(
 
 def _distance_transform(
     edges: np.ndarray, pixelSize: Any, wrap: bool, barrier: np.ndarray | None, *, with_labels: bool
-) -> tuple[np.ndarray, np.ndarray | None]:
+) -> tuple[np.ndarray, np.ndarray]:
+    """Distances and labels; these are empty where nobody wants them."""
     edges = image8("edges", _indexable("edges", edges))
     barrier = None if barrier is None else image8("barrier", barrier, edges.shape)
     pixels = _pixels(pixelSize, wrap)
     distance, labels = _outputs(edges.shape, with_labels)
-    _core.distance_transform(edges, barrier, pixels, distance, labels, _threads(edges))
+    wanted = labels if with_labels else None
+    _core.distance_transform(edges, barrier, pixels, distance, wanted, _threads(edges))
     return distance, labels
 
 
 def _salience_transform(
     salience: np.ndarray, method: int, lambda_: float, pixelSize: Any, wrap: bool, *, with_labels: bool
-) -> tuple[np.ndarray, np.ndarray | None]:
+) -> tuple[np.ndarray, np.ndarray]:
+    """Distances and labels; these are empty where nobody wants them."""
     salience = _salience(salience)
     method = flag("method", method, _METHODS)
     lambda_ = number("lambda_", lambda_, 0.0, 1e6)
     pixels = _pixels(pixelSize, wrap)
     distance, labels = _outputs(salience.shape, with_labels)
+    wanted = labels if with_labels else None
     if method == SALIENCE_MULTIPLICATIVE:
-        _core.salience_multiplicative(salience, pixels, distance, labels, _threads(salience))
+        _core.salience_multiplicative(salience, pixels, distance, wanted, _threads(salience))
     else:
-        _core.salience_additive(salience, lambda_, pixels, distance, labels, _threads(salience))
+        _core.salience_additive(salience, lambda_, pixels, distance, wanted, _threads(salience))
     return distance, labels
 
 
@@ -303,8 +307,8 @@ def _pixels(pixelSize: Any, wrap: bool) -> _core.Pixels:
     return _core.Pixels(width=width, height=height, wrap=boolean("wrap", wrap))
 
 
-def _outputs(shape: tuple[int, ...], with_labels: bool) -> tuple[np.ndarray, np.ndarray | None]:
-    return np.empty(shape, np.float32), np.empty(shape, np.int32) if with_labels else None
+def _outputs(shape: tuple[int, ...], with_labels: bool) -> tuple[np.ndarray, np.ndarray]:
+    return np.empty(shape, np.float32), np.empty(shape if with_labels else 0, np.int32)
 
 
 def _threads(image: np.ndarray) -> int:

@@ -26,11 +26,14 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
 
     Third differences along rows and columns vanish on every quadratic; on noise they have sqrt(20) times its
     deviation. Edges are few among them: sigma is the root mean square of the smaller three quarters, corrected for the
-    trimming. Per bin of depth, a + c z^2 with a, c >= 0 is fitted to it. Areas of constant values do not count.
+    trimming. Per bin of depth, sigma(z) = a + c z^2 with a, c >= 0 is fitted to it; on a grid sigma = a. Areas of
+    constant values do not count, unless nearly all of the image is constant and its levels meet in clean steps.
 
-    How much fits to n = 4, 8, 16, 32 pixels are off, on one scan line and on neighbouring ones together, is measured
-    likewise: by differences of the values and slopes of adjacent fits that vanish on every quadratic. Whoever detects
-    edges with the model counts with that; its `correlation` sums it up.
+    How much fits to n = 4, 8, 16, 32 pixels are off, on one scan line and on five neighbouring ones together, is
+    measured likewise: by D = s1 - 2 s2 + s3 and G = z1 - 2 z2 + z3 - (s3 - s1) n / 2 of the slopes s and means z of
+    three adjacent fits, which vanish on every quadratic too, and whose deviations for white noise are known. What the
+    medians exceed these by are the factors in `fits`, along rows and along columns; |D| by depth tells how the waves of
+    the noise grow with it. Whoever detects edges with the model counts with that; its `correlation` sums it up.
 
     Parameters
     ----------
@@ -44,8 +47,8 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
     -------
     retval : NoiseModel
         In the unit of the image. Never below 3e-5 of the distance (of the range of heights on a grid), so that
-        the rounding of noise-free images counts as noise, nor below that of rounding to whole units of integers or
-        to another step the values show, step / sqrt(12); that is also what is left where no window is valid.
+        the rounding of noise-free images counts as noise, nor below that of rounding to whole units of integers, or
+        to the step of which depths are multiples, step / sqrt(12); that is also what is left where no window is valid.
 
     Raises
     ------
@@ -59,7 +62,7 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
     >>> noise = np.random.default_rng(0).normal(0, 0.003, (120, 160))
     >>> K = np.array([[150, 0, 79.5], [0, 150, 59.5], [0, 0, 1]])
     >>> model = estimateNoise(1.5 + noise, K=K)
-    >>> round(model(1.5), 4)
+    >>> round(model(1.5), 3)
     0.003
     """
     (params,) = parsed(options, ScanLineParams)

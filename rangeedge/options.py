@@ -310,11 +310,11 @@ class Selection(Options):
         unit="pixels",
     )
     lineSignificance: float = option(
-        15.0,
+        14.0,
         _real(0),
         "float",
-        "Significance that a connected line must reach somewhere, as `minSignificance` is what each of its pixels must"
-        " have; 0 keeps all lines.",
+        "Least significance of a connected line, >= 0: the root mean square of its pixels' significance, times the"
+        " root of its length in units of 10 pixels; 0 keeps all lines.",
     )
     dynamic: bool = option(
         False,

@@ -28,7 +28,7 @@ PICTURES = {
 def from_samples(monkeypatch):
     monkeypatch.syspath_prepend(SAMPLES)
     yield
-    for name in ("common", "figure6", "scores", *PICTURES):
+    for name in ("calibration", "common", "figure6", "scores", *PICTURES):
         sys.modules.pop(name, None)
 
 
@@ -50,7 +50,7 @@ def image(tmp_path):
 
 
 def test_every_sample_is_tested():
-    assert {path.stem for path in SAMPLES.glob("*.py")} == {"common", "figure6", "scores", *PICTURES}
+    assert {path.stem for path in SAMPLES.glob("*.py")} == {"calibration", "common", "figure6", "scores", *PICTURES}
 
 
 @pytest.mark.parametrize("name", PICTURES)
@@ -128,6 +128,18 @@ def test_figure6_prints_and_draws(tmp_path, capsys):
     assert "CREASE_NORMAL  theory, all 5151 pairs: |E| 0.00 ± 0.00" in printed
     assert "CREASE_NORMAL  detector, sigma 0, 3 of 3 pairs" in printed
     assert cv2.imread(str(tmp_path / "new" / "folder" / "figure6.png")).std() > 10
+
+
+def test_calibration_prints_shares_near_those_of_a_normal_deviate(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    run("calibration", "--out", tmp_path)
+    lines = [line.split() for line in capsys.readouterr().out.splitlines() if " n = " in line]
+    assert len(lines) == 6 * 4 * 2
+    ratios = np.array([[float(word) for word in line[-5:]] for line in lines])
+    slopes = np.array(["slope" in line for line in lines])
+    assert ((ratios[slopes, :2] > 0.5) & (ratios[slopes, :2] < 2)).all()
+    assert (ratios[:, :2] < 2).all()
+    assert cv2.imread(str(tmp_path / "calibration.png")).std() > 10
 
 
 @pytest.mark.parametrize("argv", [["--frequency", "1"], ["--frequency", "x"], ["--sigma", "-1"]])

@@ -182,16 +182,18 @@ void nearest_across_columns(const Sources& sources, const Grid& grid, int y, con
                             Envelope& envelope, Array<double>& squared, float* distance, std::int32_t* labels) {
     const std::size_t row = grid.index(y, 0);
     const double aspect = grid.aspect();
-    const int beyond = grid.wrap ? grid.cols / 2 : 0;
-    envelope.reset(grid.cols, 1.0);
-    for (int position = -beyond; position < grid.cols + beyond; ++position) {
-        const int x = position < 0 ? position + grid.cols : position < grid.cols ? position : position - grid.cols;
+    const auto push = [&](int x, int position) {
         const int source = rows[row + static_cast<std::size_t>(x)];
-        if (source < 0) continue;
+        if (source < 0) return;
         const double dy = y - source;
         const std::size_t label = grid.index(source, x);
         envelope.push(position, aspect * (dy * dy) + sources.height(label), static_cast<int>(label));
-    }
+    };
+    const int beyond = grid.wrap ? grid.cols / 2 : 0;
+    envelope.reset(grid.cols, 1.0);
+    for (int x = grid.cols - beyond; x < grid.cols; ++x) push(x, x - grid.cols);
+    for (int x = 0; x < grid.cols; ++x) push(x, x);
+    for (int x = 0; x < beyond; ++x) push(x, x + grid.cols);
     if (envelope.size() == 0) {
         std::fill_n(distance + row, grid.cols, std::numeric_limits<float>::infinity());
         if (labels) std::fill_n(labels + row, grid.cols, -1);

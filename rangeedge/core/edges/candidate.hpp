@@ -28,6 +28,7 @@ struct Candidate {
     float jump, crease;  // length, degrees
     float significance;  // standard deviations as one of several neighbours has them, at last together with these
     std::uint8_t kind, direction;
+    bool smeared;                // a step over several samples, in whose middle it lies
     std::int32_t before, after;  // linear indices of the pixels on either side
     std::int32_t order;          // by direction, then by line, then along the line
     Side sides[2];

@@ -79,6 +79,10 @@ private:
         candidate = step.gap > options_.max_gap ? measure_outline(line, a, i, step.next, step.before, step.after)
                                                 : measure(line, a, i, step.next, edge, samples);
         if (!(candidate.kind & jump_bit)) return i;
+        // The middle of the ramp is where the rim of the nearer surface is.
+        const double middle = (line.abscissa(step.low) + line.abscissa(step.high)) / 2;
+        locate(candidate, line, {step.low, step.high, middle, (step.low + step.high) / 2.0, 0, false});
+        candidate.smeared = true;
         for (int k = step.before + 1; k < step.after; ++k)
             if (line.ordinate(k) == line.ordinate(k)) smeared.push_back(static_cast<std::int32_t>(line.pixel(k)));
         return step.next;

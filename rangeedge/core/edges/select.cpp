@@ -3,14 +3,20 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <numeric>
 #include <vector>
 
 #include "image/components.hpp"
 
 namespace rangeedge {
+namespace {
+
+constexpr double usual_length = 10;  // of the line whose significance is that of its pixels
+
+}  // namespace
 
 void keep_lines(const std::uint8_t* edges, int rows, int cols, int min_length, const float* significance,
-                float min_peak, std::uint8_t* kept) {
+                double least_significance, std::uint8_t* kept) {
     const auto stride = static_cast<std::size_t>(cols) + 2, width = static_cast<std::size_t>(cols);
     std::vector<std::uint8_t> image(stride * (static_cast<std::size_t>(rows) + 2), 0);
     for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row)
@@ -20,17 +26,20 @@ void keep_lines(const std::uint8_t* edges, int rows, int cols, int min_length, c
     const Components parts(image.data(), rows, cols, 8);
     for (int i = 0; i < parts.count(); ++i) {
         int left = cols, right = -1, top = rows, bottom = -1;
-        float peak = significance ? 0 : min_peak;
+        double squares = 0, pixels = 0;
         for (const auto [begin, end] : parts.runs(i)) {
             left = std::min(left, parts.col_of(begin)), right = std::max(right, parts.col_of(end - 1));
             top = std::min(top, parts.row_of(begin)), bottom = std::max(bottom, parts.row_of(begin));
             if (!significance) continue;
             const float* first =
                 significance + static_cast<std::size_t>(parts.row_of(begin)) * width + parts.col_of(begin);
-            peak = std::max(peak, *std::max_element(first, first + (end - begin)));
+            squares = std::inner_product(first, first + (end - begin), first, squares);
+            pixels += static_cast<double>(end - begin);
         }
-        if (!(peak >= min_peak)) continue;
-        if (std::max(right - left, bottom - top) + 1 < min_length) continue;
+        const int length = std::max(right - left, bottom - top) + 1;
+        if (length < min_length) continue;
+        if (significance && !(squares * length >= least_significance * least_significance * usual_length * pixels))
+            continue;
         for (const auto [begin, end] : parts.runs(i)) {
             const auto row = static_cast<std::size_t>(parts.row_of(begin));
             std::fill_n(kept + row * width + parts.col_of(begin), end - begin, std::uint8_t{1});

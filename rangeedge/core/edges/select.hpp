@@ -1,6 +1,6 @@
 // Which pixels of an edge map stay: isolated ones are mostly noise. The paper names thresholds on strength and length
 // of edges for that (paper, 6); the longer side of the bounding box stands for the length here. Beside it, a line must
-// be significant somewhere, so that its other pixels need less significance than a pixel by itself.
+// be significant as a whole, the more so the shorter it is: what its pixels tell adds up along it.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
@@ -8,8 +8,9 @@
 namespace rangeedge {
 
 // `kept` becomes 1 on the 8-connected components of `edges` whose bounding box has a side of at least `min_length`
-// pixels and which hold a pixel of at least `min_peak` in `significance` (null: any), else 0.
+// pixels and whose `significance` (null: any) is at least `least_significance`, else 0. That of a line is the root mean
+// square of its pixels', times the root of its length in units of 10 pixels.
 void keep_lines(const std::uint8_t* edges, int rows, int cols, int min_length, const float* significance,
-                float min_peak, std::uint8_t* kept);
+                double least_significance, std::uint8_t* kept);
 
 }  // namespace rangeedge

@@ -39,7 +39,7 @@ double share_of_step(const Line<T>& line, const EndTangent& f, const EndTangent&
 template <class T>
 SmearedStep smeared_step(const Line<T>& line, const Approximation& a, std::ptrdiff_t i,
                          const ScanLineOptions& options) {
-    const SmearedStep none{0, 0, i, 0};
+    const SmearedStep none{0, 0, 0, 0, i, 0};
     if (a.segments[i].size() <= options.max_smear) return none;
     std::ptrdiff_t next = i + 1;
     int count = 0;
@@ -49,7 +49,8 @@ SmearedStep smeared_step(const Line<T>& line, const Approximation& a, std::ptrdi
     }
     if (next == i + 1 || next == a.count) return none;
 
-    SmearedStep step{a.segments[i].last, a.segments[next].first, next, 0};
+    SmearedStep step{a.segments[i].last, a.segments[next].first, 0, 0, next, 0};
+    step.low = step.before, step.high = step.after;
     const int first = a.segments[i + 1].first;
     const EndTangent f(a.curves[i], line.abscissa(step.before)), g(a.curves[next], line.abscissa(step.after));
     double side = 0, at_first = 0, at_last = 0, steepest = 0;
@@ -66,6 +67,10 @@ SmearedStep smeared_step(const Line<T>& line, const Approximation& a, std::ptrdi
             at_last = share;
             started = started || share > own_share;
             if (!started) step.before = k;
+            if (share < 0.5)
+                step.low = k, step.high = a.segments[next].first;
+            else
+                step.high = std::min(step.high, k);
             step.after = share < 1 - own_share ? a.segments[next].first : std::min(step.after, k);
         }
     for (int k = step.before + 1; k < step.after; ++k) smeared += line.ordinate(k) == line.ordinate(k);
@@ -99,7 +104,7 @@ SmearMask::SmearMask(int rows, int cols, const std::vector<std::int32_t>& found,
 void SmearMask::clear_of_candidates(std::vector<Candidate>& candidates) const {
     if (mask_.empty()) return;
     const auto smeared = [&](const Candidate& c) {
-        if (c.kind & jump_bit) return mask_[c.kind & occluding_bit ? c.before : c.after] == within;
+        if (c.kind & jump_bit) return !c.smeared && mask_[c.kind & occluding_bit ? c.before : c.after] == within;
         return std::max(mask_[c.before], mask_[c.after]) >= beside;
     };
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), smeared), candidates.end());

@@ -24,6 +24,7 @@ constexpr double veil = 20;  // degrees from the line of sight, up to which a su
 
 struct SmearedStep {
     int before, after;    // the last sample of the surface before the ramp, the first one of that after it
+    int low, high;        // the samples on either side of the middle of the ramp
     std::ptrdiff_t next;  // the segment after it
     int gap;              // the most samples without data between two others
 };
@@ -40,7 +41,8 @@ public:
     // a smeared step goes on from line to line.
     SmearMask(int rows, int cols, const std::vector<std::int32_t>& found, int least);
 
-    // Removes jumps whose nearer side is smeared, and creases of which a pixel is smeared or beside one that is.
+    // Removes jumps whose nearer side is smeared, unless they are those of smeared steps, and creases of which a pixel is
+    // smeared or beside one that is.
     void clear_of_candidates(std::vector<Candidate>& candidates) const;
     // 255 where a pixel is smeared; the output holds zeros before.
     void write(std::uint8_t* smeared) const;

@@ -15,10 +15,11 @@
 namespace rangeedge {
 namespace {
 
-constexpr int most_windows = 1 << 14;        // along rows, and along columns
+constexpr int most_windows = 1 << 13;        // along rows, and along columns
 constexpr std::size_t fewest_windows = 200;  // that tell the noise
 constexpr int farthest = 4;                  // samples between those that are taken for neighbours
-constexpr int constant_run = 8;              // equal samples that say nothing
+constexpr int constant_run = 8;              // equal samples in whose middle windows say nothing
+constexpr int long_run = 32;                 // equal samples that no window may touch
 constexpr std::size_t most_bins = 8;
 constexpr std::size_t least_bin = 50;    // windows
 constexpr double quantised_share = 0.3;  // of windows with equal neighbours: more have values with a step
@@ -47,15 +48,14 @@ struct Windows {
         mark_constant(y, size, apart);
         reserve(static_cast<std::size_t>(number));
         for (int k = 0; k < number; ++k) {
-            const std::uint8_t* still = still_.data() + k;
-            const bool is_constant = still[0] | still[apart] | still[2 * apart] | still[3 * apart];
+            const bool is_constant = still_[static_cast<std::size_t>(k)] != 0;
             constant += is_constant;
             add(y + k, apart, counts_constant | !is_constant);
         }
     }
 
 private:
-    // Marks the samples that belong to many equal ones, `apart`.
+    // Marks the windows in the middle of constant runs, and those that have a sample of a long one.
     template <class T>
     void mark_constant(const T* y, int size, int apart) {
         still_.assign(static_cast<std::size_t>(size), 0);
@@ -64,8 +64,13 @@ private:
                 const int first = k;
                 do k += apart;
                 while (k < size && y[k] == y[first]);
-                if ((k - first) / apart < constant_run) continue;
-                for (int i = first; i < k; i += apart) still_[static_cast<std::size_t>(i)] = 1;
+                const int length = (k - first) / apart;
+                if (length < constant_run) continue;
+                const bool is_long = length >= long_run;
+                const int begin = is_long ? first - 3 * apart : first + 2 * apart;
+                const int end = is_long ? k : k - 5 * apart;
+                for (int i = begin; i < end; i += apart)
+                    if (i >= 0) still_[static_cast<std::size_t>(i)] = 1;
             }
     }
     template <class T>
@@ -147,9 +152,9 @@ struct Bins {
 // As many windows in each, but for equal ordinates.
 Bins bins_of(const Windows& windows) {
     const std::size_t count = windows.count, number = std::max<std::size_t>(1, std::min(most_bins, count / least_bin));
-    std::vector<float> borders(number - 1);
-    for (std::size_t i = 1; i < number; ++i)
-        borders[i - 1] = ranked(windows.ordinates.data(), count, i * count / number);
+    std::vector<std::size_t> ranks;
+    for (std::size_t i = 1; i < number; ++i) ranks.push_back(i * count / number);
+    const std::vector<float> borders = ranked(windows.ordinates.data(), count, ranks);
     std::vector<std::uint8_t> own(count, 0);
     for (const float border : borders)
         for (std::size_t k = 0; k < count; ++k)

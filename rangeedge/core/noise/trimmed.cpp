@@ -18,7 +18,9 @@ constexpr double kept_deviation = 0.607;       // of a normal variable of deviat
 constexpr double median_magnitude = 0.67449;   // of that variable
 constexpr double quarter_magnitude = 0.31864;  // the lower quartile of its magnitudes
 constexpr double tenth_magnitude = 0.12566;    // and their lowest tenth
-constexpr int dropped_bits = 20;               // of a float that its bucket does not tell: 8 buckets an octave are left
+constexpr double quarter_spread = 1.8;         // of that quartile of n values, as a part of it, times the root of n
+constexpr double tenth_spread = 3;
+constexpr int dropped_bits = 20;  // of a float that its bucket does not tell: 8 buckets an octave are left
 
 // The sum of the squares of values whose bits, as an integer, are below a limit.
 template <int bytes>
@@ -53,6 +55,7 @@ public:
         for (std::size_t i = 1; i < 4; ++i)
             for (std::size_t b = 0; b < buckets; ++b) counts_[0][b] += counts_[i][b];
     }
+    // The value of a rank, 0 being that of the smallest.
     float value(std::size_t rank) const {
         const Place place = find(rank);
         return place.within[place.rank];
@@ -111,6 +114,13 @@ float ranked(const float* magnitudes, std::size_t count, std::size_t rank) {
     return Histogram(magnitudes, count).value(rank);
 }
 
+std::vector<float> ranked(const float* magnitudes, std::size_t count, const std::vector<std::size_t>& ranks) {
+    const Histogram histogram(magnitudes, count);
+    std::vector<float> values;
+    for (const std::size_t rank : ranks) values.push_back(histogram.value(rank));
+    return values;
+}
+
 double quartile_deviation(const float* magnitudes, std::size_t count) {
     return count == 0 ? 0 : static_cast<double>(ranked(magnitudes, count, count / 4)) / quarter_magnitude;
 }
@@ -122,9 +132,12 @@ double median_deviation(const float* magnitudes, std::size_t count) {
 double normal_deviation(const float* magnitudes, std::size_t count) {
     if (count == 0) return 0;
     const Histogram histogram(magnitudes, count);
-    return std::min({static_cast<double>(histogram.value(count / 2)) / median_magnitude,
-                     static_cast<double>(histogram.value(count / 4)) / quarter_magnitude,
-                     static_cast<double>(histogram.value(count / 10)) / tenth_magnitude});
+    const double error = 2 / std::sqrt(static_cast<double>(count));
+    const auto by_rank = [&](std::size_t rank, double magnitude, double spread) {
+        return (1 + spread * error) * static_cast<double>(histogram.value(rank)) / magnitude;
+    };
+    return std::min({by_rank(count / 2, median_magnitude, 0), by_rank(count / 4, quarter_magnitude, quarter_spread),
+                     by_rank(count / 10, tenth_magnitude, tenth_spread)});
 }
 
 }  // namespace rangeedge
