@@ -133,6 +133,26 @@ def test_long_segments_as_the_oracle_has_them(geometry, noise):
         assert len(found) > 0
 
 
+@pytest.mark.parametrize("geometry", ["grid", "camera", "points"])
+def test_bends_as_the_oracle_has_them(geometry):
+    """Fillets over several pixels between planes, and waves of which noise makes straight lines."""
+    u = np.arange(160.0)
+    slope = np.interp(u, [20, 23, 50, 56, 80, 90, 115, 130], [0.02, -0.01, -0.01, 0.015, 0.015, -0.02, -0.02, 0.01])
+    fillets, waves = 1.5 + np.cumsum(slope), 2 - 0.3 * np.sin(u / 10)
+    for profile, noise, params in (
+        (fillets, 1e-4, ScanLineParams(minSignificance=2.0)),
+        (fillets, 1e-4, ScanLineParams(eps=0.03, mergeSignificance=0.0)),
+        (waves, 0.006, ScanLineParams()),
+        (waves, 0.015, ScanLineParams(minSignificance=2.0)),
+    ):
+        z = profile + 0.01 * noise * np.random.default_rng(3).standard_normal((5, 160))
+        src = seen(z) if geometry == "points" else z
+        options = dict(K=K) if geometry == "camera" else {}
+        common = dict(noise=NoiseModel(noise), params=params)
+        found = same_as_oracle(src, oracle.Image(src, projective=geometry != "grid", **options, **common), **options)
+        assert len(found) > 0 or profile is waves
+
+
 def checkerboard(shape):
     return np.indices(shape).sum(0) % 2 == 0
 
