@@ -6,9 +6,9 @@
 #include <array>
 #include <cstdint>
 
-#include "closure.hpp"
-#include "regions.hpp"
-#include "seeds.hpp"
+#include "regions/closure.hpp"
+#include "regions/regions.hpp"
+#include "regions/seeds.hpp"
 
 namespace nb = nanobind;
 using namespace nb::literals;

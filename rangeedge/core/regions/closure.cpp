@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "components.hpp"
+#include "../components.hpp"
 
 namespace rangeedge {
 namespace {

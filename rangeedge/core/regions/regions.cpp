@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "components.hpp"
+#include "../components.hpp"
 
 namespace rangeedge {
 namespace {
