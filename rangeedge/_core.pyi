@@ -84,6 +84,7 @@ def grow_regions(
     y: NDArray[np.float32] | None,
     ordinate: NDArray[np.float32],
     offset: float,
+    rounding: float,
     projective: bool,
     to_plane: Sequence[float],
     noise: Sequence[float],
@@ -91,6 +92,7 @@ def grow_regions(
     edges: NDArray[np.uint8] | None,
     markers: NDArray[np.int32],
     parameters: RegionParameters,
+    threads: int,
     labels: NDArray[np.int32],
 ) -> int: ...
 def verified_regions(
@@ -98,6 +100,7 @@ def verified_regions(
     y: NDArray[np.float32] | None,
     ordinate: NDArray[np.float32],
     offset: float,
+    rounding: float,
     projective: bool,
     to_plane: Sequence[float],
     noise: Sequence[float],
@@ -108,5 +111,6 @@ def verified_regions(
     share: float,
     dilations: int,
     min_area: int,
+    threads: int,
     regions: NDArray[np.int32],
 ) -> None: ...

@@ -23,11 +23,13 @@ def surface_map(frame: RangeFrame, coefficients: tuple[float, ...], noise_map: n
         y=y,
         ordinate=(frame.ordinate - frame.ordinate.dtype.type(offset)).astype(np.float32, copy=False),
         offset=offset,
+        rounding=float(np.spacing(np.abs(frame.ordinate.dtype.type(offset)))),
         projective=frame.projective,
         to_plane=to_plane,
         noise=coefficients[:3],
         noise_map=noise_map,
         edges=None,
+        threads=frame.threads,
     )
 
 

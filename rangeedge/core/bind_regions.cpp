@@ -26,27 +26,28 @@ int extract_seeds(const Map<const float>& distance, const Map<const std::uint8_t
 }
 
 rangeedge::RangeMap range_map(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
-                              bool projective, const std::array<double, 6>& to_plane,
+                              double rounding, bool projective, const std::array<double, 6>& to_plane,
                               const std::array<double, 3>& noise, const Optional& noise_map,
                               const Map<const std::uint8_t>& edges) {
     return {static_cast<int>(ordinate.shape(0)), static_cast<int>(ordinate.shape(1)), x.data(), y.data(),
-            ordinate.data(), offset, projective, to_plane, noise, noise_map.data(), edges.data()};
+            ordinate.data(), offset, rounding, projective, to_plane, noise, noise_map.data(), edges.data()};
 }
 
-int grow_regions(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset, bool projective,
-                 const std::array<double, 6>& to_plane, const std::array<double, 3>& noise, const Optional& noise_map,
+int grow_regions(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
+                 double rounding, bool projective, const std::array<double, 6>& to_plane, const std::array<double, 3>& noise, const Optional& noise_map,
                  const Map<const std::uint8_t>& edges, const Map<const std::int32_t>& markers,
-                 const rangeedge::RegionParameters& parameters, const Map<std::int32_t>& labels) {
-    const auto map = range_map(x, y, ordinate, offset, projective, to_plane, noise, noise_map, edges);
-    return rangeedge::grow_regions(map, markers.data(), parameters, labels.data());
+                 const rangeedge::RegionParameters& parameters, int threads, const Map<std::int32_t>& labels) {
+    const auto map = range_map(x, y, ordinate, offset, rounding, projective, to_plane, noise, noise_map, edges);
+    return rangeedge::grow_regions(map, markers.data(), parameters, threads, labels.data());
 }
 
 void verified_regions(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
-                      bool projective, const std::array<double, 6>& to_plane, const std::array<double, 3>& noise,
+                      double rounding, bool projective, const std::array<double, 6>& to_plane, const std::array<double, 3>& noise,
                       const Optional& noise_map, const Map<const std::uint8_t>& edges, double correlation,
-                      double tolerance, double share, int dilations, int min_area, const Map<std::int32_t>& regions) {
-    const auto map = range_map(x, y, ordinate, offset, projective, to_plane, noise, noise_map, edges);
-    rangeedge::verified_regions(map, {correlation, tolerance, share, dilations, min_area}, regions.data());
+                      double tolerance, double share, int dilations, int min_area, int threads,
+                      const Map<std::int32_t>& regions) {
+    const auto map = range_map(x, y, ordinate, offset, rounding, projective, to_plane, noise, noise_map, edges);
+    rangeedge::verified_regions(map, {correlation, tolerance, share, dilations, min_area}, threads, regions.data());
 }
 
 }  // namespace
@@ -64,11 +65,11 @@ void bind_regions(nb::module_& m) {
             },
             nb::kw_only(), "tolerance"_a, "smooth_angle"_a, "min_area"_a, "new_seeds"_a);
     m.def("grow_regions", &grow_regions, "x"_a.noconvert().none(), "y"_a.noconvert().none(), "ordinate"_a.noconvert(),
-          "offset"_a, "projective"_a, "to_plane"_a, "noise"_a, "noise_map"_a.noconvert().none(),
-          "edges"_a.noconvert().none(), "markers"_a.noconvert(), "parameters"_a, "labels"_a.noconvert(),
+          "offset"_a, "rounding"_a, "projective"_a, "to_plane"_a, "noise"_a, "noise_map"_a.noconvert().none(),
+          "edges"_a.noconvert().none(), "markers"_a.noconvert(), "parameters"_a, "threads"_a, "labels"_a.noconvert(),
           nb::call_guard<nb::gil_scoped_release>());
     m.def("verified_regions", &verified_regions, "x"_a.noconvert().none(), "y"_a.noconvert().none(),
-          "ordinate"_a.noconvert(), "offset"_a, "projective"_a, "to_plane"_a, "noise"_a,
+          "ordinate"_a.noconvert(), "offset"_a, "rounding"_a, "projective"_a, "to_plane"_a, "noise"_a,
           "noise_map"_a.noconvert().none(), "edges"_a.noconvert().none(), "correlation"_a, "tolerance"_a, "share"_a,
-          "dilations"_a, "min_area"_a, "regions"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
+          "dilations"_a, "min_area"_a, "threads"_a, "regions"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
 }

@@ -1,0 +1,114 @@
+// Patches: sets of pixels with one surface each, of which regions are made.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+#include "../disjoint_sets.hpp"
+#include "../parallel.hpp"
+#include "array.hpp"
+#include "surface.hpp"
+#include "surface_image.hpp"
+
+namespace rangeedge {
+
+struct Patch {
+    SurfaceSums sums;
+    Surface surface;
+    int refit_at;           // pixels at which the surface is due to be fitted anew
+    int whole = 0;          // pixels it had when it was found to be no roof
+    bool absorbed = false;  // belongs to the region of a much larger one, and joins no other
+    int count() const { return sums.count(); }
+};
+
+// Which patch every pixel of an image belongs to, and the patches themselves. Patch 0 is none.
+class PatchMap {
+public:
+    // What a pixel without a patch is: `reach` of a search is the last of them that it takes.
+    enum Free : std::uint8_t { taken, open_pixel, edge_pixel };
+
+    PatchMap(const RangeMap& map, Team& team);
+
+    SurfaceImage& image() { return image_; }
+    const SurfaceImage& image() const { return image_; }
+    Team& team() { return team_; }
+
+    int count() const { return patches_.count(); }
+    Patch& patch(int i) { return patches_[i]; }
+    const Patch& patch(int i) const { return patches_[i]; }
+    int operator[](int p) const { return label_[p]; }
+    bool is_free(int p, Free reach) const { return free_[p] != taken && free_[p] <= reach; }
+    // Whether eight pixels in a row are free and open.
+    bool eight_are_open(int p) const {
+        std::uint64_t eight;
+        std::memcpy(&eight, &free_[p], sizeof eight);
+        return eight == 0x0101010101010101u * open_pixel;
+    }
+
+    void take(int p, int i) { label_[p] = i, free_[p] = taken; }
+    void release(int p) {
+        label_[p] = 0;
+        free_[p] = image_.open(p) ? open_pixel : image_.valid(p) ? edge_pixel : taken;
+    }
+
+    // The patch whose surface is that of patch i, after patches were joined, and the one that names its region.
+    int surface(int i) { return surfaces_.find(i); }
+    int region(int i) { return regions_.find(surfaces_.find(i)); }
+    // Patches b and its pixels become part of patch a, which they share a surface with.
+    void join_surfaces(int a, int b);
+    void join_regions(int a, int b) { regions_.link(region(b), region(a)); }
+    // Labels of joined patches become those of the patch they joined.
+    void flatten();
+
+    // A patch for the open pixels of every marker > 0, or several where planes that meet in a crease describe them
+    // better; likewise for every set of pixels. Markers tell how much the noise over a region is.
+    void add_markers(const std::int32_t* markers);
+    void add_patches(const std::vector<Pixels>& sets);
+    // Divides the patches that have grown around a crease.
+    void cut_roofs();
+    void refit();
+
+    template <class F>
+    void for_pixels(F&& visit) const {
+        for (int row = 0; row < image_.rows(); ++row)
+            for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; ++p) visit(p);
+    }
+    // Free pixels, in raster order; most images have few.
+    template <class F>
+    void for_free(Free reach, F&& visit) const {
+        for (int p = 0, end = free_.count(); p < end;) {
+            std::uint64_t eight = 1;
+            if (p + 8 <= end) std::memcpy(&eight, &free_[p], sizeof eight);
+            const int stop = eight ? std::min(p + 8, end) : p;
+            for (int q = p; q < stop; ++q)
+                if (is_free(q, reach)) visit(q);
+            p += 8;
+        }
+    }
+
+    static int refit_after(int count) { return count + count / 3 + 16; }
+
+private:
+    struct Piece {
+        Pixels pixels;
+        SurfaceSums sums;
+        Surface surface;
+    };
+
+    void estimate_correlation(const std::vector<SurfaceSums>& sums);
+    void add_patches(const std::vector<Pixels>& sets, const std::vector<SurfaceSums>& sums);
+    std::vector<SurfaceSums> sums_of(const std::vector<Pixels>& sets) const;
+    void divide(const Pixels& pixels, const SurfaceSums& sums, int cuts, std::vector<Piece>& pieces) const;
+    void create(const Piece& piece);
+
+    SurfaceImage image_;
+    Team& team_;
+    Array<int> label_;
+    Array<std::uint8_t> free_;
+    Array<Patch> patches_;
+    DisjointSets surfaces_, regions_;
+};
+
+}  // namespace rangeedge
