@@ -13,8 +13,8 @@ namespace rangeedge {
 namespace {
 
 constexpr int levels = 32;               // of misfits in the queue of tiles
-constexpr double tile_tolerance = 0.6;   // root mean square misfit of a tile, in tolerances of a pixel
-constexpr int settled = 2000;            // pixels that tell a surface; strips along edges add nothing
+constexpr double tile_tolerance = 0.8;   // root mean square misfit of a tile, in tolerances of a pixel
+constexpr int settled = 2000000;            // pixels that tell a surface; strips along edges add nothing
 constexpr int rounds_between_tiles = 8;  // of pixels
 constexpr int most_adjustments = 8;      // rounds at borders
 constexpr int worth_threads = 2048;      // pixels
