@@ -14,7 +14,7 @@ namespace {
 constexpr double kept_rms = 1.25;       // how much a common surface may raise the rms of either patch
 constexpr double small_share = 0.2;     // a patch is small beside one so many times as large
 constexpr double most_of_border = 0.6;  // share of its pixels
-constexpr double least_border = 0.9;    // in widths of the smaller patch
+constexpr double least_border = 0.6;    // in widths of the smaller patch
 constexpr int most_rounds = 12;         // of merging
 constexpr double strip_openness = 0.2;  // share of the border of a strip that is no edge
 constexpr double strip_explained = 0.7; // share of its pixels that lie on neighbouring surfaces

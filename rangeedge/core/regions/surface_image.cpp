@@ -64,13 +64,6 @@ SurfaceImage::SurfaceImage(const RangeMap& map, double lateral, Team& team)
     });
 }
 
-bool SurfaceImage::beside_edge(int p) const {
-    const int s = stride();
-    for (const int q : {p, p - s - 1, p - s, p - s + 1, p - 1, p + 1, p + s - 1, p + s, p + s + 1})
-        if (edge(q)) return true;
-    return false;
-}
-
 double SurfaceImage::residual(const SurfaceSums& sums, const Surface& s) const {
     const double x = sums.mean_x(), y = sums.mean_y(), rms = sums.rms(s);
     const double mean_variance = sums.count() / sums.weight();

@@ -50,7 +50,11 @@ public:
     bool valid(int p) const { return state_[p] != none; }
     bool open(int p) const { return state_[p] == plain; }
     bool edge(int p) const { return state_[p] == edge_pixel; }
-    bool beside_edge(int p) const;
+    // Whether an edge runs between two neighbours, or along them a pixel away; not whether one runs across both.
+    bool edge_between(int p, int q) const {
+        const int step = q - p;
+        return edge(p - step) || edge(p) || edge(q) || edge(q + step);
+    }
 
     // The standard deviation of pixels from the surface of their region, in units of that between neighbours.
     double correlation() const { return correlation_; }
