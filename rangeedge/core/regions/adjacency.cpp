@@ -68,16 +68,15 @@ void Adjacency::collect() {
     parallel_for(image.rows(), team, [&](int first, int last, int thread) {
         auto& contacts = found[static_cast<std::size_t>(thread)];
         auto& perimeter = sides[static_cast<std::size_t>(thread)];
-        for (int row = first; row < last; ++row)
-            for (int p = image.index(row, 0), end = p + image.cols(); p < end; ++p) {
-                const int i = patches_[p];
-                for (const int q : {p + 1, p + image.stride()}) {
-                    const int j = patches_[q];
-                    if (i == j) continue;
-                    ++perimeter[i], ++perimeter[j];
-                    if (i && j && region[i] != region[j]) contacts.push_back({p, q, 0});
-                }
+        patches_.for_borders(first, last, [&](int p) {
+            const int i = patches_[p];
+            for (const int q : {p + 1, p + image.stride()}) {
+                const int j = patches_[q];
+                if (i == j) continue;
+                ++perimeter[i], ++perimeter[j];
+                if (i && j && region[i] != region[j]) contacts.push_back({p, q, 0});
             }
+        });
     });
     for (const auto& contacts : found) contacts_.insert(contacts_.end(), contacts.begin(), contacts.end());
     for (const Array<int>& counts : sides)

@@ -100,8 +100,8 @@ private:
     }
     bool is_free(const Tiles& tiles, int t) const {
         if (!tiles.is_open(t)) return false;
-        for (int row = 0, p = tiles.first_pixel(t); row < Tiles::side; ++row, p += image_.stride())
-            if (!patches_.eight_are_open(p)) return false;
+        for (int row = 0, p = tiles.first_pixel(t); row < tiles.side; ++row, p += image_.stride())
+            if (!patches_.are_open(p, tiles.side)) return false;
         return true;
     }
     void offer(const Tiles& tiles, int t, int i) {
@@ -126,7 +126,7 @@ void Grower::take_tile(const Tiles& tiles, int t, int i) {
     Patch& patch = patches_.patch(i);
     patch.sums.add(tiles.sums(t));
     refit_when_due(patch);
-    const int stride = image_.stride(), side = Tiles::side, first = tiles.first_pixel(t);
+    const int stride = image_.stride(), side = tiles.side, first = tiles.first_pixel(t);
     for (int row = 0; row < side; ++row)
         for (int p = first + row * stride; p < first + row * stride + side; ++p) patches_.take(p, i);
     taken_.push_back(t);
@@ -134,7 +134,7 @@ void Grower::take_tile(const Tiles& tiles, int t, int i) {
 
 // Offers every free tile to the patches that touch it; returns whether any was taken.
 bool Grower::over_tiles(const Tiles& tiles) {
-    const int stride = image_.stride(), side = Tiles::side;
+    const int stride = image_.stride(), side = tiles.side;
     const auto for_around = [&](int t, auto&& visit) {  // the pixels around a tile
         const int p = tiles.first_pixel(t);
         for (int k = 0; k < side; ++k) {
@@ -145,7 +145,7 @@ bool Grower::over_tiles(const Tiles& tiles) {
     taken_.clear();
     for (int t = 0; t < tiles.rows() * tiles.cols(); ++t) {
         if (!is_free(tiles, t)) continue;
-        std::array<int, 4> offered{};
+        std::array<int, 4> offered{};  // lately
         std::size_t next = 0;
         for_around(t, [&](int q) {
             const int i = patches_[q];
@@ -212,8 +212,8 @@ bool Grower::over_pixels(int rounds, bool refit) {
 
 }  // namespace
 
-Tiles::Tiles(const SurfaceImage& image, Team& team)
-    : rows_(image.rows() / side), cols_(image.cols() / side), sums_(static_cast<std::size_t>(rows_ * cols_)),
+Tiles::Tiles(const SurfaceImage& image, int size, Team& team)
+    : side(size), rows_(image.rows() / side), cols_(image.cols() / side), sums_(static_cast<std::size_t>(rows_ * cols_)),
       first_(sums_.size()) {
     parallel_for(rows_, team, [&](int begin, int end, int) {
         for (int t = begin * cols_; t < end * cols_; ++t) {
@@ -233,11 +233,12 @@ Tiles::Tiles(const SurfaceImage& image, Team& team)
     });
 }
 
-void grow(PatchMap& patches, const Tiles& tiles, double tolerance) {
+void grow(PatchMap& patches, const TilePyramid& tiles, double tolerance) {
     Grower grower(patches, PatchMap::open_pixel, tolerance);
     grower.start();
     for (bool grown = true; grown;) {
-        grown = grower.over_tiles(tiles);
+        grown = false;
+        for (const Tiles* const level : {&tiles.large, &tiles.small}) grown |= grower.over_tiles(*level);
         grown |= grower.over_pixels(rounds_between_tiles, true);
     }
     patches.refit();
@@ -253,12 +254,15 @@ void adjust_borders(PatchMap& patches) {
     const SurfaceImage& image = patches.image();
     const auto neighbours = image.neighbours();
     std::vector<int> moving;  // pixels that may
-    patches.for_pixels([&](int p) {
-        const int own = patches[p];
-        if (!own) return;
-        for (const int step : neighbours)
-            if (patches[p + step] && patches[p + step] != own) return moving.push_back(p);
+    const auto sorted = [&] {
+        std::sort(moving.begin(), moving.end());
+        moving.erase(std::unique(moving.begin(), moving.end()), moving.end());
+    };
+    patches.for_borders(0, image.rows(), [&](int p) {
+        for (const int q : {p + 1, p + image.stride()})
+            if (patches[p] && patches[q] && patches[p] != patches[q]) moving.push_back(p), moving.push_back(q);
     });
+    sorted();
     std::vector<int> best;
     for (int round = 0; round < most_adjustments && !moving.empty(); ++round) {
         best.resize(moving.size());
@@ -277,16 +281,18 @@ void adjust_borders(PatchMap& patches) {
                 }
             }
         });
-        std::vector<int> next;
-        for (std::size_t k = 0; k < moving.size(); ++k) {
-            if (best[k] == patches[moving[k]]) continue;
-            patches.take(moving[k], best[k]);
-            next.push_back(moving[k]);
-            for (const int step : neighbours) next.push_back(moving[k] + step);
+        std::vector<int> moved;
+        for (std::size_t k = 0; k < best.size(); ++k)
+            if (best[k] != patches[moving[k]]) {
+                patches.take(moving[k], best[k]);
+                moved.push_back(moving[k]);
+            }
+        moving.clear();
+        for (const int p : moved) {
+            moving.push_back(p);
+            for (const int step : neighbours) moving.push_back(p + step);
         }
-        std::sort(next.begin(), next.end());
-        next.erase(std::unique(next.begin(), next.end()), next.end());
-        moving.swap(next);
+        sorted();
     }
 }
 

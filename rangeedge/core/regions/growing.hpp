@@ -10,9 +10,9 @@ namespace rangeedge {
 // is a few operations.
 class Tiles {
 public:
-    static constexpr int side = 8;
+    const int side;  // pixels: 4 or 8
 
-    explicit Tiles(const SurfaceImage& image, Team& team);
+    Tiles(const SurfaceImage& image, int size, Team& team);
     int rows() const { return rows_; }
     int cols() const { return cols_; }
     int index(int row, int col) const { return row * cols_ + col; }
@@ -27,8 +27,13 @@ private:
     Array<int> first_;
 };
 
+struct TilePyramid {
+    Tiles large, small;
+    TilePyramid(const SurfaceImage& image, Team& team) : large(image, 8, team), small(image, 4, team) {}
+};
+
 // Patches grow over open pixels within `tolerance` standard deviations of their surfaces, which follow their pixels.
-void grow(PatchMap& patches, const Tiles& tiles, double tolerance);
+void grow(PatchMap& patches, const TilePyramid& tiles, double tolerance);
 
 // Free pixels up to `reach` go to the neighbouring patch they fit best, within `tolerance`; surfaces stay.
 void fill(PatchMap& patches, PatchMap::Free reach, double tolerance);

@@ -13,6 +13,7 @@ namespace rangeedge {
 namespace {
 
 constexpr int max_cuts = 4;              // of one set of pixels into planes
+constexpr double grown = 1.1;            // a patch that may have become a roof, in pixels it had when it was none
 constexpr double correlation_max = 4.0;  // noise over a region, in units of that between neighbours
 
 }  // namespace
@@ -134,12 +135,12 @@ void PatchMap::estimate_correlation(const std::vector<SurfaceSums>& sums) {
 }
 
 void PatchMap::cut_roofs() {
-    // What has not changed since it was found to be no roof is none.
+    // What has hardly grown since it was found to be no roof is none.
     Array<int> number(static_cast<std::size_t>(count()), 0);  // among the patches to test, from 1
     int candidates = 0;
     for (int i = 1; i < count(); ++i) {
         const Patch& p = patch(i);
-        if (p.surface.curved && p.count() >= least_curved && p.count() != p.whole) number[i] = ++candidates;
+        if (p.surface.curved && p.count() >= least_curved && p.count() > grown * p.whole) number[i] = ++candidates;
     }
     if (!candidates) return;
     std::vector<Pixels> sets(static_cast<std::size_t>(candidates));

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <vector>
@@ -40,11 +41,11 @@ public:
     const Patch& patch(int i) const { return patches_[i]; }
     int operator[](int p) const { return label_[p]; }
     bool is_free(int p, Free reach) const { return free_[p] != taken && free_[p] <= reach; }
-    // Whether eight pixels in a row are free and open.
-    bool eight_are_open(int p) const {
-        std::uint64_t eight;
-        std::memcpy(&eight, &free_[p], sizeof eight);
-        return eight == 0x0101010101010101u * open_pixel;
+    // Whether n pixels in a row, 4 or 8, are free and open.
+    bool are_open(int p, int n) const {
+        static constexpr std::uint8_t open[8]{open_pixel, open_pixel, open_pixel, open_pixel,
+                                              open_pixel, open_pixel, open_pixel, open_pixel};
+        return n == 8 ? !std::memcmp(&free_[p], open, 8) : !std::memcmp(&free_[p], open, 4);
     }
 
     void take(int p, int i) { label_[p] = i, free_[p] = taken; }
@@ -74,6 +75,26 @@ public:
     void for_pixels(F&& visit) const {
         for (int row = 0; row < image_.rows(); ++row)
             for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; ++p) visit(p);
+    }
+    // Pixels of rows [first, last) that differ from their right or lower neighbour, in raster order; most images have few.
+    template <class F>
+    void for_borders(int first, int last, F&& visit) const {
+        constexpr int block = 16;
+        const int stride = image_.stride();
+        for (int row = first; row < last; ++row)
+            for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; p += block) {
+                const int n = std::min(block, end - p);
+                const int* const label = &label_[p];
+                int differ = 0;
+                if (n == block)
+                    for (int k = 0; k < block; ++k)
+                        differ |= (label[k] ^ label[k + 1]) | (label[k] ^ label[k + stride]);
+                else
+                    differ = 1;
+                if (!differ) continue;
+                for (int k = 0; k < n; ++k)
+                    if (label[k] != label[k + 1] || label[k] != label[k + stride]) visit(p + k);
+            }
     }
     // Free pixels, in raster order; most images have few.
     template <class F>

@@ -42,7 +42,7 @@ void add_uncovered(PatchMap& patches) {
     patches.add_patches(sets);
 }
 
-void grow_and_cut(PatchMap& patches, const Tiles& tiles, double tolerance) {
+void grow_and_cut(PatchMap& patches, const TilePyramid& tiles, double tolerance) {
     grow(patches, tiles, tolerance);
     patches.cut_roofs();
     grow(patches, tiles, tolerance);
@@ -85,7 +85,7 @@ int grow_regions(const RangeMap& map, const std::int32_t* markers, const RegionP
                  std::int32_t* labels) {
     Team team(threads);
     PatchMap patches(map, team);
-    const Tiles tiles(patches.image(), team);
+    const TilePyramid tiles(patches.image(), team);
     const Tolerance tolerance{parameters.tolerance, parameters.smooth_angle};
 
     patches.add_markers(markers);

@@ -11,7 +11,7 @@ namespace {
 constexpr double flat = 1.25;         // rms in standard deviations up to which a plane is one
 constexpr double curved_gain = 0.8;   // a quadratic must lower the rms to this share
 constexpr double resolution = 1e-6;   // of ordinates in single precision
-constexpr int sample_step = 7;        // one pixel in so many tells the typical noise
+constexpr int sample_step = 61;       // one pixel in so many tells the typical noise
 
 struct Range {
     float low = 0, high = 0;
@@ -36,12 +36,16 @@ SurfaceImage::SurfaceImage(const RangeMap& map, double lateral, Team& team)
     for (const Range& r : ranges) all = {std::min(all.low, r.low), std::max(all.high, r.high)};
     const double extent = static_cast<double>(all.high) - static_cast<double>(all.low);
     const double least = std::max({resolution * extent, map.rounding, std::numeric_limits<double>::min()});
+    // Of the ordinate q = 1 / z of a camera: sigma(z) q^2.
+    const auto& [c0, c1, c2] = map.noise;
     const auto sigma = [&](int k) {
-        const double ordinate = offset_ + static_cast<double>(map.ordinate[k]);
-        const double z = projective_ ? 1 / ordinate : std::abs(ordinate);
-        const double length = map.noise_map ? static_cast<double>(map.noise_map[k])
-                                            : map.noise[0] + (map.noise[1] + map.noise[2] * z) * z;
-        return std::max(projective_ ? length * ordinate * ordinate : length, least);
+        const double q = offset_ + static_cast<double>(map.ordinate[k]), z = std::abs(q);
+        double s;
+        if (map.noise_map)
+            s = static_cast<double>(map.noise_map[k]) * (projective_ ? q * q : 1);
+        else
+            s = projective_ ? (c0 * q + c1) * q + c2 : c0 + (c1 + c2 * z) * z;
+        return std::max(s, least);
     };
     std::vector<double> sigmas;
     for (int k = 0; k < rows_ * cols_; k += sigmas.empty() ? 1 : sample_step - k % sample_step)
@@ -50,14 +54,15 @@ SurfaceImage::SurfaceImage(const RangeMap& map, double lateral, Team& team)
     const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
     std::nth_element(sigmas.begin(), middle, sigmas.end());
     unit_ = *middle;
+    const double per_unit = 1 / unit_;
     parallel_for(rows_, team, [&](int first, int last, int) {
         for (int row = first; row < last; ++row)
             for (int col = 0; col < cols_; ++col) {
                 const int k = row * cols_ + col, p = index(row, col);
                 if (!std::isfinite(map.ordinate[k])) continue;
-                const double s = sigma(k) / unit_;
+                const double s = sigma(k) * per_unit;
                 pixel_[p] = {map.x ? map.x[k] : static_cast<float>(col), map.y ? map.y[k] : static_cast<float>(row),
-                             static_cast<float>(static_cast<double>(map.ordinate[k]) / unit_),
+                             static_cast<float>(static_cast<double>(map.ordinate[k]) * per_unit),
                              static_cast<float>(s * s)};
                 state_[p] = map.edges && map.edges[k] ? edge_pixel : plain;
             }
