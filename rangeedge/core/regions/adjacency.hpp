@@ -37,6 +37,7 @@ public:
     const std::vector<Neighbours>& update();
     // Patch i has another surface than at the last update.
     void has_changed(int i) { changed_[i] = 1; }
+    const Tolerance& tolerance() const { return tolerance_; }
     // Sides of pixels where a patch ends, at the beginning.
     int perimeter(int i) const { return perimeter_[i]; }
 

@@ -2,6 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
 #include "patches.hpp"
 
 namespace rangeedge {
@@ -12,7 +18,7 @@ class Tiles {
 public:
     const int side;  // pixels: 4 or 8
 
-    Tiles(const SurfaceImage& image, int size, Team& team);
+    Tiles(const SurfaceImage& image, int size);
     int rows() const { return rows_; }
     int cols() const { return cols_; }
     int index(int row, int col) const { return row * cols_ + col; }
@@ -21,24 +27,93 @@ public:
     const SurfaceSums& sums(int t) const { return sums_[t]; }
     int first_pixel(int t) const { return first_[t]; }
 
+    // Sums of a tile from its pixels, or from the four smaller tiles that it consists of, if all of these are open.
+    void add_up(const SurfaceImage& image, int t);
+    void add_up(const Tiles& quarters, int row, int col);
+
 private:
     int rows_, cols_;
     Array<SurfaceSums> sums_;
     Array<int> first_;
 };
 
-struct TilePyramid {
-    Tiles large, small;
-    TilePyramid(const SurfaceImage& image, Team& team) : large(image, 8, team), small(image, 4, team) {}
+// Tiles and patches by the misfit of one to the other, the smallest first, first come first served among equals.
+class TileQueue {
+public:
+    static constexpr int levels = 32;
+    struct Entry {
+        int tile, patch;
+    };
+
+    void push(int level, Entry entry) {
+        bucket_[static_cast<std::size_t>(level)].push_back(entry);
+        lowest_ = std::min(lowest_, static_cast<std::size_t>(level));
+    }
+    bool pop(Entry& entry) {
+        for (; lowest_ < levels; ++lowest_) {
+            auto& bucket = bucket_[lowest_];
+            std::size_t& head = head_[lowest_];
+            if (head < bucket.size()) {
+                entry = bucket[head++];
+                return true;
+            }
+            bucket.clear();
+            head = 0;
+        }
+        return false;
+    }
+
+private:
+    std::array<std::vector<Entry>, levels> bucket_;
+    std::array<std::size_t, levels> head_{};
+    std::size_t lowest_ = levels;
 };
 
-// Patches grow over open pixels within `tolerance` standard deviations of their surfaces, which follow their pixels.
-void grow(PatchMap& patches, const TilePyramid& tiles, double tolerance);
+struct TilePyramid {
+    Tiles large, small;
+    TilePyramid(const SurfaceImage& image, Team& team);
+};
 
-// Free pixels up to `reach` go to the neighbouring patch they fit best, within `tolerance`; surfaces stay.
-void fill(PatchMap& patches, PatchMap::Free reach, double tolerance);
+// Grows the patches of one image. What it allocates is as large as the image, so it is made once.
+class Grower {
+public:
+    explicit Grower(PatchMap& patches);
 
-// Pixels at borders move to the neighbouring patch if they fit that better.
-void adjust_borders(PatchMap& patches);
+    // Patches grow over open pixels within `tolerance` standard deviations of their surfaces, which follow their pixels.
+    void grow(double tolerance);
+    // Free pixels, of edges too, go to the neighbouring patch they fit best, within `tolerance`; surfaces stay.
+    void fill(double tolerance);
+    // Pixels at borders move to the neighbouring patch if they fit that better.
+    void adjust_borders();
+
+private:
+    // Which of the neighbouring patches a pixel fits best, and how well.
+    struct Choice {
+        int patch = 0;
+        double residual = 0;
+    };
+
+    void start(PatchMap::Free reach, double tolerance);
+    void over_tiles(const Tiles& tiles);
+    int over_pixels(int rounds, bool refit);
+    bool is_free(const Tiles& tiles, int t) const;
+    void offer(const Tiles& tiles, int t, int i);
+    void take_tile(const Tiles& tiles, int t, int i);
+    void refit_when_due(Patch& patch);
+    Choice choose(int p) const;
+    void wait(int p);
+    template <class F>
+    void for_front(F&& body);
+
+    PatchMap& patches_;
+    const SurfaceImage& image_;
+    TilePyramid tiles_;
+    PatchMap::Free reach_ = PatchMap::open_pixel;
+    double limit_ = 0;  // of squared residuals
+    TileQueue queue_;
+    Array<std::uint8_t> waiting_;  // whether a pixel is in front_
+    std::vector<int> front_, next_, taken_;
+    std::vector<Choice> choices_;
+};
 
 }  // namespace rangeedge

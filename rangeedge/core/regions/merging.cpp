@@ -43,8 +43,7 @@ bool continues(const Patch& small, const Patch& large, const Border& border, int
 }  // namespace
 
 // The longest borders first. What is small beside its neighbour joins one region, and never links two.
-void merge(PatchMap& patches, const Tolerance& tolerance) {
-    Adjacency adjacency(patches, tolerance);
+void merge(PatchMap& patches, Adjacency& adjacency) {
     bool changed = true;
     for (int round = 0; changed && round < most_rounds; ++round) {
         changed = false;
@@ -72,12 +71,11 @@ void merge(PatchMap& patches, const Tolerance& tolerance) {
     }
 }
 
-void absorb_strips(PatchMap& patches, const Tolerance& tolerance) {
+void absorb_strips(PatchMap& patches, Adjacency& adjacency) {
     const SurfaceImage& image = patches.image();
     const auto count = static_cast<std::size_t>(patches.count());
     Array<std::vector<int>> around(count);
     Array<Border> total(count);
-    Adjacency adjacency(patches, tolerance);
     for (const auto& [a, b, border] : adjacency.update())
         for (const auto& [i, j] : {std::make_pair(a, b), std::make_pair(b, a)}) {
             around[i].push_back(j);
@@ -111,7 +109,7 @@ void absorb_strips(PatchMap& patches, const Tolerance& tolerance) {
                 const double r = image.residual(pixels[k][n], patches.patch(j).surface);
                 if (r < least) least = r, best[k][n] = j;
             }
-            fitting += std::sqrt(least) < strip_tolerance * tolerance.deviations;
+            fitting += std::sqrt(least) < strip_tolerance * adjacency.tolerance().deviations;
         }
         if (fitting < strip_explained * static_cast<double>(pixels[k].size())) best[k].clear();
     });

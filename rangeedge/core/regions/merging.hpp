@@ -6,10 +6,10 @@
 
 namespace rangeedge {
 
-void merge(PatchMap& patches, const Tolerance& tolerance);
+void merge(PatchMap& patches, Adjacency& adjacency);
 
 // Strips along rounded edges are no surfaces: small patches, open to their neighbours, whose pixels those explain. Their
 // pixels go to these.
-void absorb_strips(PatchMap& patches, const Tolerance& tolerance);
+void absorb_strips(PatchMap& patches, Adjacency& adjacency);
 
 }  // namespace rangeedge

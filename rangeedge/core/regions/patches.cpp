@@ -134,7 +134,7 @@ void PatchMap::estimate_correlation(const std::vector<SurfaceSums>& sums) {
     }
 }
 
-void PatchMap::cut_roofs() {
+bool PatchMap::cut_roofs() {
     // What has hardly grown since it was found to be no roof is none.
     Array<int> number(static_cast<std::size_t>(count()), 0);  // among the patches to test, from 1
     int candidates = 0;
@@ -142,7 +142,7 @@ void PatchMap::cut_roofs() {
         const Patch& p = patch(i);
         if (p.surface.curved && p.count() >= least_curved && p.count() > grown * p.whole) number[i] = ++candidates;
     }
-    if (!candidates) return;
+    if (!candidates) return false;
     std::vector<Pixels> sets(static_cast<std::size_t>(candidates));
     for_pixels([&](int p) {
         if (const int k = number[label_[p]]) sets[static_cast<std::size_t>(k - 1)].push_back(p);
@@ -158,15 +158,18 @@ void PatchMap::cut_roofs() {
         divide(first, image_.sums_of(first), 1, pieces[k]);
         divide(second, image_.sums_of(second), 1, pieces[k]);
     });
+    bool any = false;
     for (int i = 0; i < candidates; ++i) {
         const auto k = static_cast<std::size_t>(i);
         Patch& p = patch(owner[i]);
         p.whole = p.count();
         if (pieces[k].empty()) continue;
+        any = true;
         for (const int pixel : sets[k]) release(pixel);
         p.sums = SurfaceSums();
         for (const Piece& piece : pieces[k]) create(piece);
     }
+    return any;
 }
 
 }  // namespace rangeedge

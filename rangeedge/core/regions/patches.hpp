@@ -67,8 +67,8 @@ public:
     // better; likewise for every set of pixels. Markers tell how much the noise over a region is.
     void add_markers(const std::int32_t* markers);
     void add_patches(const std::vector<Pixels>& sets);
-    // Divides the patches that have grown around a crease.
-    void cut_roofs();
+    // Divides the patches that have grown around a crease; returns whether there were any.
+    bool cut_roofs();
     void refit();
 
     template <class F>
