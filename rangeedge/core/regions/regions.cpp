@@ -22,8 +22,8 @@ namespace {
 
 constexpr double loose = 2;  // pixels of edges and borders may lie farther off their surface, by this factor
 
-// Components of what is free and open with all its neighbours become patches.
-void add_uncovered(PatchMap& patches) {
+// Components of what is free and open with all its neighbours become patches. Returns whether there are any.
+bool add_uncovered(PatchMap& patches) {
     const SurfaceImage& image = patches.image();
     const auto is_open = [&](int p) { return patches.is_free(p, PatchMap::open_pixel); };
     const auto in_row = [&](int p) { return is_open(p - 1) && is_open(p) && is_open(p + 1); };
@@ -33,19 +33,20 @@ void add_uncovered(PatchMap& patches) {
         inside[p] = in_row(p - image.stride()) && in_row(p) && in_row(p + image.stride());
         any |= inside[p] != 0;
     });
-    if (!any) return;
+    if (!any) return false;
     const Components parts(inside.data(), image.rows(), image.cols());
     std::vector<Pixels> sets(static_cast<std::size_t>(parts.count()));
     for (int i = 0; i < parts.count(); ++i)
         for (const auto [begin, end] : parts.runs(i))
             for (int p = begin; p < end; ++p) sets[static_cast<std::size_t>(i)].push_back(p);
+    const int before = patches.count();
     patches.add_patches(sets);
+    return patches.count() > before;
 }
 
-void grow_and_cut(PatchMap& patches, const TilePyramid& tiles, double tolerance) {
-    grow(patches, tiles, tolerance);
-    patches.cut_roofs();
-    grow(patches, tiles, tolerance);
+void grow(PatchMap& patches, Grower& grower, double tolerance) {
+    grower.grow(tolerance);
+    if (patches.cut_roofs()) grower.grow(tolerance);
 }
 
 // Connected parts of regions.
@@ -85,23 +86,23 @@ int grow_regions(const RangeMap& map, const std::int32_t* markers, const RegionP
                  std::int32_t* labels) {
     Team team(threads);
     PatchMap patches(map, team);
-    const TilePyramid tiles(patches.image(), team);
     const Tolerance tolerance{parameters.tolerance, parameters.smooth_angle};
 
     patches.add_markers(markers);
-    grow_and_cut(patches, tiles, parameters.tolerance);
-    for (int round = 0; parameters.new_seeds && round < 2; ++round) {
-        add_uncovered(patches);
-        grow_and_cut(patches, tiles, parameters.tolerance);
-    }
-    merge(patches, tolerance);
+    Grower grower(patches);
+    grow(patches, grower, parameters.tolerance);
+    for (int round = 0; parameters.new_seeds && round < 2; ++round)
+        if (add_uncovered(patches)) grow(patches, grower, parameters.tolerance);
+    Adjacency between_edges(patches, tolerance);
+    merge(patches, between_edges);
     patches.flatten();
-    fill(patches, PatchMap::edge_pixel, loose * parameters.tolerance);
-    adjust_borders(patches);
-    merge(patches, tolerance);
-    absorb_strips(patches, tolerance);
+    grower.fill(loose * parameters.tolerance);
+    grower.adjust_borders();
+    Adjacency adjacency(patches, tolerance);
+    merge(patches, adjacency);
+    absorb_strips(patches, adjacency);
     remove_small(patches, parameters.min_area);
-    fill(patches, PatchMap::edge_pixel, 2 * loose * parameters.tolerance);
+    grower.fill(2 * loose * parameters.tolerance);
     return write_labels(patches, labels);
 }
 
