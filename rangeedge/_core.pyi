@@ -77,6 +77,7 @@ def extract_seeds(
     mask: NDArray[np.uint8] | None,
     min_distance: float,
     separation: float,
+    threads: int,
     markers: NDArray[np.int32],
 ) -> int: ...
 def grow_regions(

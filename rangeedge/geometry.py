@@ -12,7 +12,7 @@ import numpy as np
 from . import _core
 from ._args import array, boolean, camera_matrix, described, fail, image8, number, pixel_size
 
-_THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
+THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
 SRC = "a depth image of shape (H, W), or points of shape (H, W, 3) or (H, W, 4)"
 
 
@@ -36,7 +36,7 @@ class RangeFrame:
     @property
     def threads(self) -> int:
         """How many threads the image is worth."""
-        return cv2.getNumThreads() if self.shape[0] * self.shape[1] >= _THREAD_PIXELS else 1
+        return cv2.getNumThreads() if self.shape[0] * self.shape[1] >= THREAD_PIXELS else 1
 
     @cached_property
     def ordinate(self) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 
 from . import _core
 from ._args import array, described, error, fail, image8, image32f, number
+from .geometry import THREAD_PIXELS
 
 
 def extractSeeds(
@@ -136,4 +137,5 @@ def _seeds(
     minDistance, separation = seeding(func, minDistance, separation)
     mask = None if mask is None else image8(func, "mask", mask, distance.shape)
     markers = np.empty(distance.shape, np.int32)
-    return _core.extract_seeds(distance, mask, minDistance, separation, markers) + 1, markers
+    threads = cv2.getNumThreads() if distance.size >= THREAD_PIXELS else 1
+    return _core.extract_seeds(distance, mask, minDistance, separation, threads, markers) + 1, markers

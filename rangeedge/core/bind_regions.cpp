@@ -20,9 +20,9 @@ using Map = nb::ndarray<T, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Optional = Map<const float>;
 
 int extract_seeds(const Map<const float>& distance, const Map<const std::uint8_t>& mask, float min_distance,
-                  float separation, const Map<std::int32_t>& markers) {
+                  float separation, int threads, const Map<std::int32_t>& markers) {
     return rangeedge::extract_seeds(distance.data(), mask.data(), static_cast<int>(distance.shape(0)),
-                                    static_cast<int>(distance.shape(1)), min_distance, separation, markers.data());
+                                    static_cast<int>(distance.shape(1)), min_distance, separation, threads, markers.data());
 }
 
 rangeedge::RangeMap range_map(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
@@ -55,7 +55,7 @@ void verified_regions(const Optional& x, const Optional& y, const Map<const floa
 // Outputs are written in place; masks may be None. Shapes are the caller's to check.
 void bind_regions(nb::module_& m) {
     m.def("extract_seeds", &extract_seeds, "distance"_a.noconvert(), "mask"_a.noconvert().none(), "min_distance"_a,
-          "separation"_a, "markers"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
+          "separation"_a, "threads"_a, "markers"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
     using rangeedge::RegionParameters;
     nb::class_<RegionParameters>(m, "RegionParameters")
         .def(
