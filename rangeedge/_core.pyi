@@ -115,3 +115,26 @@ def verified_regions(
     threads: int,
     regions: NDArray[np.int32],
 ) -> None: ...
+def label_statistics(
+    labels: NDArray[np.int32], threads: int, boxes: NDArray[np.int32], centroids: NDArray[np.float64]
+) -> None: ...
+def region_moments(
+    labels: NDArray[np.int32],
+    points: NDArray[np.float64],
+    ordinate: NDArray[np.float64],
+    threads: int,
+    origins: NDArray[np.float64],
+    scales: NDArray[np.float64],
+    moments: NDArray[np.float64],
+    curved: NDArray[np.uint8],
+) -> None: ...
+def quadric_misfits(
+    labels: NDArray[np.int32],
+    points: NDArray[np.float64],
+    threads: int,
+    origins: NDArray[np.float64],
+    scales: NDArray[np.float64],
+    quadrics: NDArray[np.float64],
+    floors: NDArray[np.float64],
+    misfits: NDArray[np.float64],
+) -> None: ...

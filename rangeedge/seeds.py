@@ -102,19 +102,13 @@ def extractSeedsWithStats(
 
 def label_statistics(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Bounding box and area, and centroid, of every label 0 .. count - 1, as `cv2.connectedComponentsWithStats`."""
-    flat = labels.ravel()
-    area = np.bincount(flat, minlength=count)
-    first, last = (np.empty((count, 2), np.int32) for _ in range(2))
-    centroids = np.empty((count, 2))
-    for axis, coordinate in enumerate(np.indices(labels.shape, np.int32)[::-1]):
-        coordinate = coordinate.ravel()
-        first[:, axis], last[:, axis] = np.iinfo(np.int32).max, -1
-        np.minimum.at(first[:, axis], flat, coordinate)
-        np.maximum.at(last[:, axis], flat, coordinate)
-        with np.errstate(invalid="ignore"):
-            centroids[:, axis] = np.bincount(flat, weights=coordinate, minlength=count) / area
-    first[area == 0], last[area == 0] = 0, -1
-    return np.column_stack([first, last - first + 1, area]).astype(np.int32), centroids
+    boxes, centroids = np.empty((count, 5), np.int32), np.empty((count, 2))
+    _core.label_statistics(labels, _threads(labels), boxes, centroids)
+    return boxes, centroids
+
+
+def _threads(image: np.ndarray) -> int:
+    return cv2.getNumThreads() if image.size >= THREAD_PIXELS else 1
 
 
 def seeding(func: str, minDistance: float, separation: float) -> tuple[float, float]:
@@ -137,5 +131,4 @@ def _seeds(
     minDistance, separation = seeding(func, minDistance, separation)
     mask = None if mask is None else image8(func, "mask", mask, distance.shape)
     markers = np.empty(distance.shape, np.int32)
-    threads = cv2.getNumThreads() if distance.size >= THREAD_PIXELS else 1
-    return _core.extract_seeds(distance, mask, minDistance, separation, threads, markers) + 1, markers
+    return _core.extract_seeds(distance, mask, minDistance, separation, _threads(distance), markers) + 1, markers
