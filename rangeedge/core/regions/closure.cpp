@@ -15,7 +15,7 @@ class Closer {
 public:
     Closer(const RangeMap& map, const ClosureParameters& parameters, Team& team)
         : image_(map, lateral_deviation, team), parameters_(parameters), region_(size(), 0) {
-        image_.set_correlation(parameters.correlation);
+        image_.set_correlation(parameters.correlation, 1);
     }
 
     void verify();

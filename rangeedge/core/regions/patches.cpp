@@ -8,6 +8,7 @@
 
 #include "roof.hpp"
 #include "tasks.hpp"
+#include "tile_noise.hpp"
 
 namespace rangeedge {
 namespace {
@@ -25,6 +26,8 @@ PatchMap::PatchMap(const RangeMap& map, Team& team)
         for (int p = image_.index(first, 0), end = image_.index(last, 0); p < end; ++p) release(p);
     });
     create({});
+    const TileNoise noise = tile_noise(image_, team_);
+    image_.set_correlation(std::min(noise.deviation, correlation_max), noise.area);
 }
 
 void PatchMap::create(const Piece& piece) {
@@ -115,8 +118,8 @@ void PatchMap::divide(const Pixels& pixels, const SurfaceSums& sums, int cuts, s
     }
 }
 
-// Noise correlated over several pixels moves surfaces more than its deviation between neighbours tells: the typical
-// misfit of a quadratic to one of the sets does.
+// Noise correlated over several pixels moves surfaces more than its deviation between neighbours tells. The noise of
+// tiles says how much at least, the typical misfit of a quadratic to one of the sets how much where sets are large.
 void PatchMap::estimate_correlation(const std::vector<SurfaceSums>& sums) {
     std::vector<std::pair<double, int>> misfits;
     double total = 0, sum = 0;
@@ -129,7 +132,7 @@ void PatchMap::estimate_correlation(const std::vector<SurfaceSums>& sums) {
     for (const auto& [rms, count] : misfits) {
         sum += count;
         if (2 * sum < total) continue;
-        image_.set_correlation(std::clamp(rms, 1.0, correlation_max));
+        image_.set_correlation(std::clamp(rms, image_.correlation(), correlation_max), image_.correlation_area());
         return;
     }
 }

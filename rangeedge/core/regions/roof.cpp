@@ -12,6 +12,7 @@ namespace rangeedge {
 namespace {
 
 constexpr double roof_gain = 0.97;     // two planes must lower the rms of the quadratic to this share
+constexpr double chance_gain = 4;      // by chance
 constexpr int roof_rounds = 8;
 constexpr double rounded = 2.5;        // pixels on either side of a ridge that may be rounded
 constexpr std::size_t most_samples = 2048;
@@ -51,7 +52,7 @@ bool split_roof(const SurfaceImage& image, const Pixels& pixels, const Surface& 
     const std::size_t least = std::max<std::size_t>(static_cast<std::size_t>(least_pixels) / step, 4);
     double of_roof = 0, of_curved = 0;
     for (int round = 0; round < roof_rounds; ++round) {
-        if (side_a.size() < least || side_b.size() < least) return false;
+    if (side_a.size() < least || side_b.size() < least) return false;
         roof.first = plane_of(side_a), roof.second = plane_of(side_b);
         const double bend = std::hypot(roof.first.c[1] - roof.second.c[1], roof.first.c[2] - roof.second.c[2]);
         const std::size_t before = side_a.size();
@@ -67,7 +68,9 @@ bool split_roof(const SurfaceImage& image, const Pixels& pixels, const Surface& 
         }
         if (round && side_a.size() == before) break;
     }
-    if (side_a.size() < least || side_b.size() < least || of_roof >= roof_gain * roof_gain * of_curved) return false;
+    const double chance = chance_gain * image.correlation_area() / static_cast<double>(pixels.size());
+    const double gain = std::max(1 - roof_gain * roof_gain, chance);
+    if (side_a.size() < least || side_b.size() < least || of_roof >= (1 - gain) * of_curved) return false;
     first.clear(), second.clear();
     for (const int p : pixels) {
         const Sample s = image.sample(p);

@@ -58,7 +58,9 @@ public:
 
     // The standard deviation of pixels from the surface of their region, in units of that between neighbours.
     double correlation() const { return correlation_; }
-    void set_correlation(double correlation) { correlation_ = correlation; }
+    // Over how many pixels the noise is the same.
+    double correlation_area() const { return correlation_area_; }
+    void set_correlation(double correlation, double area) { correlation_ = correlation, correlation_area_ = area; }
 
     Sample sample(int p) const {
         const Pixel& s = pixel_[p];
@@ -109,7 +111,7 @@ private:
 
     int rows_, cols_;
     bool projective_;
-    double lateral_, offset_, unit_ = 1, correlation_ = 1;
+    double lateral_, offset_, unit_ = 1, correlation_ = 1, correlation_area_ = 1;
     std::array<double, 6> to_plane_;
     Array<Pixel> pixel_;
     Array<std::uint8_t> state_;
