@@ -27,30 +27,42 @@ using List = nb::ndarray<T, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 int extract_seeds(const Map<const float>& distance, const Map<const std::uint8_t>& mask, float min_distance,
                   float separation, int threads, const Map<std::int32_t>& markers) {
     return rangeedge::extract_seeds(distance.data(), mask.data(), static_cast<int>(distance.shape(0)),
-                                    static_cast<int>(distance.shape(1)), min_distance, separation, threads, markers.data());
+                                    static_cast<int>(distance.shape(1)), min_distance, separation, threads,
+                                    markers.data());
 }
 
 rangeedge::RangeMap range_map(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
                               double rounding, bool projective, const std::array<double, 6>& to_plane,
                               const std::array<double, 3>& noise, const Optional& noise_map,
                               const Map<const std::uint8_t>& edges) {
-    return {static_cast<int>(ordinate.shape(0)), static_cast<int>(ordinate.shape(1)), x.data(), y.data(),
-            ordinate.data(), offset, rounding, projective, to_plane, noise, noise_map.data(), edges.data()};
+    return {static_cast<int>(ordinate.shape(0)),
+            static_cast<int>(ordinate.shape(1)),
+            x.data(),
+            y.data(),
+            ordinate.data(),
+            offset,
+            rounding,
+            projective,
+            to_plane,
+            noise,
+            noise_map.data(),
+            edges.data()};
 }
 
-int grow_regions(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
-                 double rounding, bool projective, const std::array<double, 6>& to_plane, const std::array<double, 3>& noise, const Optional& noise_map,
-                 const Map<const std::uint8_t>& edges, const Map<const std::int32_t>& markers,
-                 const rangeedge::RegionParameters& parameters, int threads, const Map<std::int32_t>& labels) {
+int grow_regions(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset, double rounding,
+                 bool projective, const std::array<double, 6>& to_plane, const std::array<double, 3>& noise,
+                 const Optional& noise_map, const Map<const std::uint8_t>& edges,
+                 const Map<const std::int32_t>& markers, const rangeedge::RegionParameters& parameters, int threads,
+                 const Map<std::int32_t>& labels) {
     const auto map = range_map(x, y, ordinate, offset, rounding, projective, to_plane, noise, noise_map, edges);
     return rangeedge::grow_regions(map, markers.data(), parameters, threads, labels.data());
 }
 
 void verified_regions(const Optional& x, const Optional& y, const Map<const float>& ordinate, double offset,
-                      double rounding, bool projective, const std::array<double, 6>& to_plane, const std::array<double, 3>& noise,
-                      const Optional& noise_map, const Map<const std::uint8_t>& edges, double correlation,
-                      double tolerance, double share, int dilations, int min_area, int threads,
-                      const Map<std::int32_t>& regions) {
+                      double rounding, bool projective, const std::array<double, 6>& to_plane,
+                      const std::array<double, 3>& noise, const Optional& noise_map,
+                      const Map<const std::uint8_t>& edges, double correlation, double tolerance, double share,
+                      int dilations, int min_area, int threads, const Map<std::int32_t>& regions) {
     const auto map = range_map(x, y, ordinate, offset, rounding, projective, to_plane, noise, noise_map, edges);
     rangeedge::verified_regions(map, {correlation, tolerance, share, dilations, min_area}, threads, regions.data());
 }
@@ -74,8 +86,7 @@ void region_moments(const Map<const std::int32_t>& labels, const Stack<const dou
 
 void quadric_misfits(const Map<const std::int32_t>& labels, const Stack<const double>& points, int threads,
                      const Map<const double>& origins, const List<const double>& scales,
-                     const Map<const double>& quadrics, const List<const double>& floors,
-                     const List<double>& misfits) {
+                     const Map<const double>& quadrics, const List<const double>& floors, const List<double>& misfits) {
     rangeedge::quadric_misfits(label_image(labels, scales.shape(0)), points.data(), threads, origins.data(),
                                scales.data(), quadrics.data(), floors.data(), misfits.data());
 }
@@ -105,8 +116,8 @@ void bind_regions(nb::module_& m) {
     m.def("label_statistics", &label_statistics, "labels"_a.noconvert(), "threads"_a, "boxes"_a.noconvert(),
           "centroids"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
     m.def("region_moments", &region_moments, "labels"_a.noconvert(), "points"_a.noconvert(), "ordinate"_a.noconvert(),
-          "threads"_a, "origins"_a.noconvert(), "scales"_a.noconvert(), "moments"_a.noconvert(),
-          "curved"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());
+          "threads"_a, "origins"_a.noconvert(), "scales"_a.noconvert(), "moments"_a.noconvert(), "curved"_a.noconvert(),
+          nb::call_guard<nb::gil_scoped_release>());
     m.def("quadric_misfits", &quadric_misfits, "labels"_a.noconvert(), "points"_a.noconvert(), "threads"_a,
           "origins"_a.noconvert(), "scales"_a.noconvert(), "quadrics"_a.noconvert(), "floors"_a.noconvert(),
           "misfits"_a.noconvert(), nb::call_guard<nb::gil_scoped_release>());

@@ -31,8 +31,8 @@ public:
 
 private:
     std::size_t slot(int a, int b) const {
-        const std::uint64_t key = static_cast<std::uint64_t>(static_cast<std::uint32_t>(a)) << 32 |
-                                  static_cast<std::uint32_t>(b);
+        const std::uint64_t key =
+            static_cast<std::uint64_t>(static_cast<std::uint32_t>(a)) << 32 | static_cast<std::uint32_t>(b);
         std::size_t k = static_cast<std::size_t>((key * 0x9e3779b97f4a7c15u) >> 32) & (slots_.size() - 1);
         while (slots_[k] >= 0 && pairs_[static_cast<std::size_t>(slots_[k])] != std::make_pair(a, b))
             k = (k + 1) & (slots_.size() - 1);
@@ -98,7 +98,8 @@ void Adjacency::sort_by_section() {
         sections_.push_back({a, b, start[k], start[k + 1], false, {}});
     }
     std::vector<Contact> sorted(contacts_.size());
-    for (const Contact& c : contacts_) sorted[static_cast<std::size_t>(start[static_cast<std::size_t>(c.section)]++)] = c;
+    for (const Contact& c : contacts_)
+        sorted[static_cast<std::size_t>(start[static_cast<std::size_t>(c.section)]++)] = c;
     contacts_.swap(sorted);
 }
 

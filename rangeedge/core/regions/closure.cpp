@@ -135,8 +135,7 @@ void Closer::write(std::int32_t* regions) const {
 
 }  // namespace
 
-void verified_regions(const RangeMap& map, const ClosureParameters& parameters, int threads,
-                      std::int32_t* regions) {
+void verified_regions(const RangeMap& map, const ClosureParameters& parameters, int threads, std::int32_t* regions) {
     Team team(threads);
     Closer closer(map, parameters, team);
     closer.verify();

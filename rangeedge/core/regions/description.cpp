@@ -18,9 +18,9 @@
 namespace rangeedge {
 namespace {
 
-constexpr double curved_gain = 0.8;   // a quadratic must lower the rms of a plane to this share
-constexpr double least_relief = 1e-6; // of the rms of a plane, in ranges of the ordinate
-constexpr int least_curved = 40;      // pixels; fewer tell no curvature
+constexpr double curved_gain = 0.8;    // a quadratic must lower the rms of a plane to this share
+constexpr double least_relief = 1e-6;  // of the rms of a plane, in ranges of the ordinate
+constexpr int least_curved = 40;       // pixels; fewer tell no curvature
 
 class LabelRuns {
 public:
@@ -45,7 +45,8 @@ private:
     template <class F>
     static void for_runs(const LabelImage& image, F&& visit) {
         for (int row = 0; row < image.rows; ++row) {
-            const std::int32_t* const labels = image.labels + static_cast<std::size_t>(row) * static_cast<std::size_t>(image.cols);
+            const std::int32_t* const labels =
+                image.labels + static_cast<std::size_t>(row) * static_cast<std::size_t>(image.cols);
             for (int col = 0; col < image.cols;) {
                 Run run{row, col, col};
                 while (run.end < image.cols && labels[run.end] == labels[col]) ++run.end;
@@ -127,7 +128,8 @@ void Description::measure(int label, double* origin, double& scale, double* mome
         const Point p = normalised(pixel, origin, scale);
         term[0] = 1;
         for (std::size_t n = 1; n < moment_count; ++n)
-            term[n] = term[static_cast<std::size_t>(monomials.factor[n])] * p[static_cast<std::size_t>(monomials.axis[n])];
+            term[n] =
+                term[static_cast<std::size_t>(monomials.factor[n])] * p[static_cast<std::size_t>(monomials.axis[n])];
         for (std::size_t n = 0; n < moment_count; ++n) sum[n] += term[n];
     });
     for (std::size_t n = 0; n < moment_count; ++n) moments[n] = sum[n] / count;

@@ -11,14 +11,14 @@
 namespace rangeedge {
 namespace {
 
-constexpr double kept_rms = 1.25;       // how much a common surface may raise the rms of either patch
-constexpr double small_share = 0.2;     // a patch is small beside one so many times as large
-constexpr double most_of_border = 0.6;  // share of its pixels
-constexpr double least_border = 0.6;    // in widths of the smaller patch
-constexpr int most_rounds = 12;         // of merging
-constexpr double strip_openness = 0.2;  // share of the border of a strip that is no edge
-constexpr double strip_explained = 0.7; // share of its pixels that lie on neighbouring surfaces
-constexpr double strip_tolerance = 2;   // of these, in tolerances of a pixel
+constexpr double kept_rms = 1.25;        // how much a common surface may raise the rms of either patch
+constexpr double small_share = 0.2;      // a patch is small beside one so many times as large
+constexpr double most_of_border = 0.6;   // share of its pixels
+constexpr double least_border = 0.6;     // in widths of the smaller patch
+constexpr int most_rounds = 12;          // of merging
+constexpr double strip_openness = 0.2;   // share of the border of a strip that is no edge
+constexpr double strip_explained = 0.7;  // share of its pixels that lie on neighbouring surfaces
+constexpr double strip_tolerance = 2;    // of these, in tolerances of a pixel
 
 bool is_small(const Patch& a, const Patch& beside) { return a.count() < small_share * beside.count(); }
 
@@ -59,8 +59,7 @@ void merge(PatchMap& patches, Adjacency& adjacency) {
                 patches.join_surfaces(a, b);
                 refitted[a] = refitted[b] = 1;
                 adjacency.has_changed(a), adjacency.has_changed(b);
-            } else if (!refitted[a] && !refitted[b] &&
-                       continues(small, large, found.border, adjacency.perimeter(b))) {
+            } else if (!refitted[a] && !refitted[b] && continues(small, large, found.border, adjacency.perimeter(b))) {
                 small.absorbed = is_small(small, large);
                 patches.join_regions(a, b);
             } else {

@@ -109,8 +109,7 @@ void PatchMap::divide(const Pixels& pixels, const SurfaceSums& sums, int cuts, s
     if (sums.count() < least_pixels) return;
     const Surface surface = image_.surface_of(sums);
     Pixels first, second;
-    if (cuts < max_cuts && !image_.is_flat(surface) &&
-        split_roof(image_, pixels, sums.quadratic(), first, second)) {
+    if (cuts < max_cuts && !image_.is_flat(surface) && split_roof(image_, pixels, sums.quadratic(), first, second)) {
         divide(first, image_.sums_of(first), cuts + 1, pieces);
         divide(second, image_.sums_of(second), cuts + 1, pieces);
     } else {

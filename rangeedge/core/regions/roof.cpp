@@ -11,10 +11,10 @@
 namespace rangeedge {
 namespace {
 
-constexpr double roof_gain = 0.97;     // two planes must lower the rms of the quadratic to this share
-constexpr double chance_gain = 4;      // by chance
+constexpr double roof_gain = 0.97;  // two planes must lower the rms of the quadratic to this share
+constexpr double chance_gain = 4;   // by chance
 constexpr int roof_rounds = 8;
-constexpr double rounded = 2.5;        // pixels on either side of a ridge that may be rounded
+constexpr double rounded = 2.5;  // pixels on either side of a ridge that may be rounded
 constexpr std::size_t most_samples = 2048;
 const double pi = std::acos(-1.0);
 
@@ -48,11 +48,12 @@ bool split_roof(const SurfaceImage& image, const Pixels& pixels, const Surface& 
     const double cx = std::cos(across), cy = std::sin(across);
     // The ridge itself may be rounded: neither fits nor the comparison count the pixels along it.
     std::vector<Sample> side_a, side_b;
-    for (const Sample& s : samples) ((s.x - curved.x0) * cx + (s.y - curved.y0) * cy < 0 ? side_a : side_b).push_back(s);
+    for (const Sample& s : samples)
+        ((s.x - curved.x0) * cx + (s.y - curved.y0) * cy < 0 ? side_a : side_b).push_back(s);
     const std::size_t least = std::max<std::size_t>(static_cast<std::size_t>(least_pixels) / step, 4);
     double of_roof = 0, of_curved = 0;
     for (int round = 0; round < roof_rounds; ++round) {
-    if (side_a.size() < least || side_b.size() < least) return false;
+        if (side_a.size() < least || side_b.size() < least) return false;
         roof.first = plane_of(side_a), roof.second = plane_of(side_b);
         const double bend = std::hypot(roof.first.c[1] - roof.second.c[1], roof.first.c[2] - roof.second.c[2]);
         const std::size_t before = side_a.size();

@@ -46,7 +46,7 @@ void keep_highest(const std::int32_t* __restrict beside, std::int32_t step, int 
 
 struct Pass {
     std::int32_t level;  // bits of its distance
-    int a, b;  // summits on either side, in order of index
+    int a, b;            // summits on either side, in order of index
 
     bool same_sides(const Pass& other) const { return a == other.a && b == other.b; }
 };
@@ -106,7 +106,8 @@ Array<int> DistanceImage::basins() const {
             const std::int32_t* const own = &level_[begin];
             int* const to = &uphill[begin];
             std::fill(top.begin(), top.end(), -1);
-            for (std::size_t k = 0; k < 4; ++k) keep_highest(own + around[k], around[k], cols_, top.data(), to);  // of lower index: higher where equal
+            for (std::size_t k = 0; k < 4; ++k)
+                keep_highest(own + around[k], around[k], cols_, top.data(), to);  // of lower index: higher where equal
             keep_highest(own, 0, cols_, top.data(), to);
             for (std::size_t k = 4; k < 8; ++k) keep_highest(own + around[k], around[k], cols_, top.data(), to);
             for (int k = 0; k < cols_; ++k) to[k] += begin + k;
@@ -128,8 +129,8 @@ std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
     parallel_for(rows_, team_, [&](int first, int last, int thread) {
         auto& passes = found[static_cast<std::size_t>(thread)];
         for_pixels(first, last, [&](int p) {
-            if (((summit[p] ^ summit[p + 1]) | (summit[p] ^ summit[p + stride() - 1]) | (summit[p] ^ summit[p + stride()]) |
-                 (summit[p] ^ summit[p + stride() + 1])) == 0)
+            if (((summit[p] ^ summit[p + 1]) | (summit[p] ^ summit[p + stride() - 1]) |
+                 (summit[p] ^ summit[p + stride()]) | (summit[p] ^ summit[p + stride() + 1])) == 0)
                 return;
             for (const int step : forward) {
                 const int a = summit[p], b = summit[p + step];

@@ -53,8 +53,8 @@ void SurfaceSums::add(const SurfaceSums& other) {
 
 SurfaceSums SurfaceSums::joined(const SurfaceSums& other) const {
     const double wa = power_[0], wb = other.power_[0], share = wa + wb > 0 ? wb / (wa + wb) : 0;
-    SurfaceSums sum = moved(x0_ + share * (other.x0_ - x0_), y0_ + share * (other.y0_ - y0_),
-                            base_ + share * (other.base_ - base_));
+    SurfaceSums sum =
+        moved(x0_ + share * (other.x0_ - x0_), y0_ + share * (other.y0_ - y0_), base_ + share * (other.base_ - base_));
     sum.add(other);
     return sum;
 }
@@ -62,8 +62,12 @@ SurfaceSums SurfaceSums::joined(const SurfaceSums& other) const {
 double SurfaceSums::rms(const Surface& surface) const {
     if (count_ == 0) return 0;
     // The surface as counted from the origin of the sums.
-    const std::array<double, 6> c{surface.value(x0_, y0_) - base_, surface.slope_x(x0_, y0_),
-                                  surface.slope_y(x0_, y0_), surface.c[3], surface.c[4], surface.c[5]};
+    const std::array<double, 6> c{surface.value(x0_, y0_) - base_,
+                                  surface.slope_x(x0_, y0_),
+                                  surface.slope_y(x0_, y0_),
+                                  surface.c[3],
+                                  surface.c[4],
+                                  surface.c[5]};
     const std::size_t terms = surface.curved ? 6 : 3;
     double sum = square_;
     for (std::size_t i = 0; i < terms; ++i) {

@@ -20,12 +20,12 @@ struct RangeMap {
     const float* y;         // null: the row
     const float* ordinate;  // grows toward the viewer, less `offset`; NaN: no data
     double offset;
-    double rounding;                  // of ordinates, before `offset` was taken away
-    bool projective;                  // the ordinate is inverse depth, else height
-    std::array<double, 6> to_plane;   // (x, y, 1) to normalised image coordinates, or to lengths
-    std::array<double, 3> noise;      // standard deviation a + b z + c z^2 of a length z
-    const float* noise_map;           // or that of every pixel; null: the former
-    const std::uint8_t* edges;        // non-zero: edge; null: none
+    double rounding;                 // of ordinates, before `offset` was taken away
+    bool projective;                 // the ordinate is inverse depth, else height
+    std::array<double, 6> to_plane;  // (x, y, 1) to normalised image coordinates, or to lengths
+    std::array<double, 3> noise;     // standard deviation a + b z + c z^2 of a length z
+    const float* noise_map;          // or that of every pixel; null: the former
+    const std::uint8_t* edges;       // non-zero: edge; null: none
 };
 
 using Pixels = std::vector<int>;
@@ -104,8 +104,7 @@ private:
     };
 
     double variance(double variance, double slope_x, double slope_y) const {
-        return correlation_ * correlation_ * variance +
-               lateral_ * lateral_ * (slope_x * slope_x + slope_y * slope_y);
+        return correlation_ * correlation_ * variance + lateral_ * lateral_ * (slope_x * slope_x + slope_y * slope_y);
     }
     std::array<double, 3> normal(const Surface& s, double x, double y) const;
 
