@@ -1,7 +1,8 @@
-// Patches grow over tiles first: a tile of 8 x 8 pixels without an edge joins the neighbouring patch it fits best, by its
-// power sums alone, tiles with the smallest misfit first. What is left are strips along edges and borders, which grow
-// pixel by pixel in rounds: all pixels that touch a patch choose among the patches they touch, then all choices become
-// true at once. So every round can be shared among threads, and its outcome does not depend on how.
+// Patches grow over tiles first: a tile of 8 x 8 pixels without an edge joins the neighbouring patch it fits best, by
+// its power sums alone, tiles with the smallest misfit first; then tiles of 4 x 4. What is left are strips along edges
+// and borders, which grow pixel by pixel in rounds: all pixels that touch a patch choose among the patches they touch,
+// then all choices become true at once. So every round can be shared among threads, and its outcome does not depend on
+// how.
 // SPDX-License-Identifier: Apache-2.0
 #include "growing.hpp"
 

@@ -79,7 +79,7 @@ class Grower {
 public:
     explicit Grower(PatchMap& patches);
 
-    // Patches grow over open pixels within `tolerance` standard deviations of their surfaces, which follow their pixels.
+    // Patches grow over open pixels within `tolerance` standard deviations of their surfaces, which follow them.
     void grow(double tolerance);
     // Free pixels, of edges too, go to the neighbouring patch they fit best, within `tolerance`; surfaces stay.
     void fill(double tolerance);

@@ -8,8 +8,8 @@ namespace rangeedge {
 
 void merge(PatchMap& patches, Adjacency& adjacency);
 
-// Strips along rounded edges are no surfaces: small patches, open to their neighbours, whose pixels those explain. Their
-// pixels go to these.
+// Strips along rounded edges are no surfaces: small patches, open to their neighbours, whose pixels those explain.
+// Their pixels go to these.
 void absorb_strips(PatchMap& patches, Adjacency& adjacency);
 
 }  // namespace rangeedge

@@ -76,7 +76,7 @@ public:
         for (int row = 0; row < image_.rows(); ++row)
             for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; ++p) visit(p);
     }
-    // Pixels of rows [first, last) that differ from their right or lower neighbour, in raster order; most images have few.
+    // Pixels of rows [first, last) whose patch is not that of their right or lower neighbour, in raster order.
     template <class F>
     void for_borders(int first, int last, F&& visit) const {
         constexpr int block = 16;

@@ -1,9 +1,9 @@
-// Uphill from every pixel, always to the highest neighbour, leads to a summit; the pixels that lead to one are its basin.
+// Uphill from every pixel, always to the highest neighbour, leads to a summit; the pixels that lead to it are a basin.
 // Two neighbouring basins are linked by a pass: of the pairs of neighbouring pixels across their border, the one whose
 // lower pixel is highest. The best way between two summits goes from basin to basin over passes, since within a basin
 // it only goes up and down again. So a few summits and passes tell what all the pixels do. Passes are taken in falling
-// order, as water that sinks uncovers them: each joins two islands, and the lower of their peaks counts by itself if the
-// pass is low beside it.
+// order, as water that sinks uncovers them: each joins two islands, and the lower of their peaks counts by itself if
+// the pass is low beside it.
 // SPDX-License-Identifier: Apache-2.0
 #include "seeds.hpp"
 

@@ -16,8 +16,8 @@ constexpr std::size_t place(int i, int j) { return static_cast<std::size_t>((i +
 // Pivots below this share of their diagonal are taken for zero: that direction is not determined by the samples.
 constexpr double dependent = 1e-9;
 
-// Power sums of degree up to n, of samples of which every u grows by a and every v by b: binomial expansion, by repeated
-// addition in place (Horner's scheme).
+// Power sums of degree up to n when every u grows by a and every v by b: the binomial expansion, by repeated addition
+// in place (Horner's scheme).
 template <int n, std::size_t size>
 void shift(std::array<double, size>& sums, double a, double b) {
     for (int j = 0; j < n; ++j)

@@ -1,8 +1,8 @@
 // Independent noise averages out: the mean of n pixels deviates by 1 / sqrt(n) of a pixel. That of stereo, of time of
 // flight and of registered images does not, since neighbours err together. How far the means of tiles deviate is found
 // as the noise of pixels is: third differences along rows and columns of tiles vanish on every quadratic, and are
-// sqrt(20) times the deviation of a mean elsewhere. Edges are many among tiles, so the smallest quarter counts. Tiles of
-// 4 and of 8 pixels see waves of about that length; their variances add up.
+// sqrt(20) times the deviation of a mean elsewhere. Edges are many among tiles, so the smallest quarter counts. Tiles
+// of 4 and of 8 pixels see waves of about that length; their variances add up.
 // SPDX-License-Identifier: Apache-2.0
 #include "tile_noise.hpp"
 
