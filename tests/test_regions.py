@@ -271,25 +271,19 @@ class TestSegmentation:
         assert seen[0][40, [38, 39, 40, 48, 49, 50]].tolist() == [2, 1, 0, 0, 1, 2]
 
     def test_skew_of_the_camera_matters(self):
-        # A face-on plane and one turned by 7 degrees about the image's diagonal; with skew, by another angle. The
-        # planes meet without an edge, and count as one up to 8 degrees.
-        skew = 60.0
-        K = CAMERA.geometry["K"]
-        skewed = K.copy()
-        skewed[0, 1] = skew
-        v, u = np.mgrid[:120, :160]
-
-        def seen_by(K, angle):
-            rays = np.linalg.inv(K) @ np.stack([u, v, np.ones_like(u)]).reshape(3, -1)
-            turned = np.array([0, np.sin(angle), np.cos(angle)])
-            depth = np.minimum(1 / rays[2], 1 / np.maximum(turned @ rays, 1e-3)).reshape(u.shape)
-            return depth + np.random.default_rng(3).normal(0, 1e-4, depth.shape)
-
-        for camera in (K, skewed):
-            markers = markers_at(u.shape, (slice(5, 40), slice(30, 130)), (slice(80, 115), slice(30, 130)))
-            options = {"K": camera, "noise": 1e-4}
-            assert growRegions(seen_by(camera, np.radians(6.5)), markers, **options).max() == 1
-            assert growRegions(seen_by(camera, np.radians(9.5)), markers, **options).max() == 2
+        # A face-on plane, and one turned about the vertical axis, meet without an edge: one surface up to 8 degrees.
+        rows, cols = np.mgrid[:120, :160]
+        pixels = np.stack([cols.ravel(), rows.ravel(), np.ones(cols.size)])
+        markers = markers_at(cols.shape, (slice(30, 90), slice(20, 60)), (slice(30, 90), slice(100, 140)))
+        for skew in (0.0, 100.0):
+            K = CAMERA.geometry["K"].copy()
+            K[0, 1] = skew
+            x = (np.linalg.inv(K) @ pixels)[0].reshape(cols.shape)
+            x -= x[60, 80]  # the planes meet in the middle
+            for degrees, count in ((6.5, 1), (9.5, 2)):
+                turned = 1 + np.tan(np.radians(degrees)) * x  # inverse depth
+                depth = 1 / np.where(x > 0, turned, 1) + np.random.default_rng(3).normal(0, 1e-4, x.shape)
+                assert growRegions(depth, markers, K=K, noise=1e-4).max() == count
 
     def test_one_marker_beside_thousands(self):
         # Cells that touch one long region alone, and join it: linear in their number.
