@@ -115,8 +115,8 @@ Border Adjacency::measure(const Section& section, const Patch& a, const Patch& b
     for (int k = section.first; k < section.last; ++k) {
         const Contact& c = contacts_[static_cast<std::size_t>(k)];
         ++border.pixels;
-        if (image.edge_between(c.p, c.q)) continue;
-        ++border.open;
+        const bool open = !image.edge_between(c.p, c.q);
+        border.open += open;
         const auto [gap, cosine] = image.continuation(c.p, c.q, a.surface, b.surface);
         border.smooth += gap <= smooth_gap && cosine >= least_cosine;
         border.similar += gap <= similar_gap && cosine >= rough;

@@ -15,6 +15,7 @@ constexpr double kept_rms = 1.25;        // how much a common surface may raise 
 constexpr double small_share = 0.2;      // a patch is small beside one so many times as large
 constexpr double most_of_border = 0.6;   // share of its pixels
 constexpr double least_border = 0.6;     // in widths of the smaller patch
+constexpr double longest_bend = 1.3;      // border of a bend, in roots of its area
 constexpr int most_rounds = 12;          // of merging
 constexpr double strip_openness = 0.2;   // share of the border of a strip that is no edge
 constexpr double strip_explained = 0.7;  // share of its pixels that lie on neighbouring surfaces
@@ -30,6 +31,12 @@ bool one_surface(const SurfaceImage& image, const Patch& a, const Patch& b) {
         return p.sums.rms(s) <= kept_rms * std::max(p.surface.rms, image.correlation());
     };
     return kept(a) && kept(b);
+}
+
+// Whether a patch lies across the way to another like the bend of a strip, and not along a border like a rounded edge.
+bool is_bend(const Patch& patch, const Border& border) {
+    return border.similar > most_of_border * border.pixels &&
+           border.pixels < longest_bend * std::sqrt(static_cast<double>(patch.count()));
 }
 
 // Whether the smaller of two patches goes on into the larger: for most of a border that is not much shorter than the
@@ -60,7 +67,7 @@ void merge(PatchMap& patches, Adjacency& adjacency) {
                 refitted[a] = refitted[b] = 1;
                 adjacency.has_changed(a), adjacency.has_changed(b);
             } else if (!refitted[a] && !refitted[b] && continues(small, large, found.border, adjacency.perimeter(b))) {
-                small.absorbed = is_small(small, large);
+                small.absorbed = is_small(small, large) && !is_bend(small, found.border);
                 patches.join_regions(a, b);
             } else {
                 continue;
