@@ -90,19 +90,24 @@ void PatchMap::add_markers(const std::int32_t* markers) {
     }
     const std::vector<SurfaceSums> sums = sums_of(sets);
     estimate_correlation(sums);
-    add_patches(sets, sums);
+    add_patches(sets, sums, HUGE_VAL);
 }
 
-void PatchMap::add_patches(const std::vector<Pixels>& sets) { add_patches(sets, sums_of(sets)); }
+bool PatchMap::add_patches(const std::vector<Pixels>& sets, double limit) {
+    return add_patches(sets, sums_of(sets), limit);
+}
 
-void PatchMap::add_patches(const std::vector<Pixels>& sets, const std::vector<SurfaceSums>& sums) {
+bool PatchMap::add_patches(const std::vector<Pixels>& sets, const std::vector<SurfaceSums>& sums, double limit) {
     std::vector<std::vector<Piece>> pieces(sets.size());
     for_tasks(static_cast<int>(sets.size()), team_, [&](int i) {
         const auto k = static_cast<std::size_t>(i);
         divide(sets[k], sums[k], 0, pieces[k]);
     });
+    const int before = count();
     for (const auto& of_set : pieces)
-        for (const Piece& piece : of_set) create(piece);
+        for (const Piece& piece : of_set)
+            if (image_.residual(piece.sums, piece.surface) < limit * limit) create(piece);
+    return count() > before;
 }
 
 void PatchMap::divide(const Pixels& pixels, const SurfaceSums& sums, int cuts, std::vector<Piece>& pieces) const {

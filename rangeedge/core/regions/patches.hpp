@@ -64,9 +64,10 @@ public:
     void flatten();
 
     // A patch for the open pixels of every marker > 0, or several where planes that meet in a crease describe them
-    // better; likewise for every set of pixels. Markers tell how much the noise over a region is.
+    // better; likewise for every set of pixels, where the surface lies within `limit` standard deviations of them.
+    // Returns whether there is any patch. Markers tell how much the noise over a region is.
     void add_markers(const std::int32_t* markers);
-    void add_patches(const std::vector<Pixels>& sets);
+    bool add_patches(const std::vector<Pixels>& sets, double limit);
     // Divides the patches that have grown around a crease; returns whether there were any.
     bool cut_roofs();
     void refit();
@@ -119,7 +120,7 @@ private:
     };
 
     void estimate_correlation(const std::vector<SurfaceSums>& sums);
-    void add_patches(const std::vector<Pixels>& sets, const std::vector<SurfaceSums>& sums);
+    bool add_patches(const std::vector<Pixels>& sets, const std::vector<SurfaceSums>& sums, double limit);
     std::vector<SurfaceSums> sums_of(const std::vector<Pixels>& sets) const;
     void divide(const Pixels& pixels, const SurfaceSums& sums, int cuts, std::vector<Piece>& pieces) const;
     void create(const Piece& piece);

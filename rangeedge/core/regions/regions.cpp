@@ -9,6 +9,7 @@
 #include "regions.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -20,16 +21,18 @@
 namespace rangeedge {
 namespace {
 
+constexpr double sure = 2.5;  // rms of a surface among edges that are none, in standard deviations
 constexpr double loose = 2;  // pixels of edges and borders may lie farther off their surface, by this factor
 
-// Components of what is free and open with all its neighbours become patches. Returns whether there are any.
-bool add_uncovered(PatchMap& patches) {
+// Components of what is free up to `reach` with all its neighbours become patches, if their surfaces lie within `limit`
+// standard deviations of their pixels. Returns whether there are any.
+bool add_uncovered(PatchMap& patches, PatchMap::Free reach, double limit) {
     const SurfaceImage& image = patches.image();
-    const auto is_open = [&](int p) { return patches.is_free(p, PatchMap::open_pixel); };
-    const auto in_row = [&](int p) { return is_open(p - 1) && is_open(p) && is_open(p + 1); };
+    const auto is_free = [&](int p) { return patches.is_free(p, reach); };
+    const auto in_row = [&](int p) { return is_free(p - 1) && is_free(p) && is_free(p + 1); };
     Array<std::uint8_t> inside(static_cast<std::size_t>(image.size()), 0);
     bool any = false;
-    patches.for_free(PatchMap::open_pixel, [&](int p) {
+    patches.for_free(reach, [&](int p) {
         inside[p] = in_row(p - image.stride()) && in_row(p) && in_row(p + image.stride());
         any |= inside[p] != 0;
     });
@@ -39,9 +42,7 @@ bool add_uncovered(PatchMap& patches) {
     for (int i = 0; i < parts.count(); ++i)
         for (const auto [begin, end] : parts.runs(i))
             for (int p = begin; p < end; ++p) sets[static_cast<std::size_t>(i)].push_back(p);
-    const int before = patches.count();
-    patches.add_patches(sets);
-    return patches.count() > before;
+    return patches.add_patches(sets, limit);
 }
 
 void grow(PatchMap& patches, Grower& grower, double tolerance) {
@@ -92,11 +93,13 @@ int grow_regions(const RangeMap& map, const std::int32_t* markers, const RegionP
     Grower grower(patches);
     grow(patches, grower, parameters.tolerance);
     for (int round = 0; parameters.new_seeds && round < 2; ++round)
-        if (add_uncovered(patches)) grow(patches, grower, parameters.tolerance);
+        if (add_uncovered(patches, PatchMap::open_pixel, HUGE_VAL)) grow(patches, grower, parameters.tolerance);
     Adjacency between_edges(patches, tolerance);
     merge(patches, between_edges);
     patches.flatten();
     grower.fill(loose * parameters.tolerance);
+    if (parameters.new_seeds && add_uncovered(patches, PatchMap::edge_pixel, sure))
+        grower.fill(loose * parameters.tolerance);
     grower.adjust_borders();
     Adjacency adjacency(patches, tolerance);
     merge(patches, adjacency);
