@@ -13,11 +13,11 @@
 namespace rangeedge {
 namespace {
 
-constexpr double tile_tolerance = 0.8;   // root mean square misfit of a tile, in tolerances of a pixel
-constexpr int rounds_between_tiles = 8;  // of pixels
-constexpr int worth_tiles = 500;         // pixels that grew meanwhile
-constexpr int most_adjustments = 8;      // rounds at borders
-constexpr int worth_threads = 2048;      // pixels
+constexpr double tile_tolerance = 0.8;       // root mean square misfit of a tile, in tolerances of a pixel
+constexpr int rounds_between_tiles = 8;      // of pixels
+constexpr int worth_tiles = 500;             // pixels that grew meanwhile
+constexpr int most_adjustments = 8;          // rounds at borders
+constexpr std::size_t worth_threads = 2048;  // pixels
 
 }  // namespace
 
@@ -112,10 +112,11 @@ bool Grower::is_free(const Tiles& tiles, int t) const {
     return true;
 }
 
-void Grower::offer(const Tiles& tiles, int t, int i) {
+// The misfit of a tile to a patch, as a level of the queue.
+int Grower::level_of(const Tiles& tiles, int t, int i) const {
     const double limit = tile_tolerance * tile_tolerance * limit_;
     const double r = image_.residual(tiles.sums(t), patches_.patch(i).surface);
-    if (r < limit) queue_.push(static_cast<int>(r / limit * TileQueue::levels), {t, i});
+    return r < limit ? static_cast<int>(r / limit * TileQueue::levels) : TileQueue::levels;
 }
 
 void Grower::take_tile(const Tiles& tiles, int t, int i) {
@@ -138,30 +139,39 @@ void Grower::over_tiles(const Tiles& tiles) {
         for (int k = 0; k < side; ++k) visit(p - 1 + k * stride);
         for (int k = 0; k < side; ++k) visit(p + side + k * stride);
     };
+    // Those that touch a patch, in parallel; each thread keeps the order, and so does the queue.
+    std::vector<std::vector<std::pair<int, TileQueue::Entry>>> offers(static_cast<std::size_t>(patches_.team().size()));
+    parallel_for(tiles.count(), patches_.team(), [&](int begin, int end, int thread) {
+        for (int t = begin; t < end; ++t) {
+            if (!is_free(tiles, t)) continue;
+            std::array<int, 4> offered{};  // lately
+            std::size_t next = 0;
+            for_around(t, [&](int q) {
+                const int i = patches_[q];
+                if (!i || std::find(offered.begin(), offered.end(), i) != offered.end()) return;
+                offered[next++ % offered.size()] = i;
+                const int level = level_of(tiles, t, i);
+                if (level < TileQueue::levels) offers[static_cast<std::size_t>(thread)].push_back({level, {t, i}});
+            });
+        }
+    });
+    for (const auto& of_thread : offers)
+        for (const auto& [level, entry] : of_thread) queue_.push(level, entry);
     taken_.clear();
-    for (int t = 0; t < tiles.rows() * tiles.cols(); ++t) {
-        if (!is_free(tiles, t)) continue;
-        std::array<int, 4> offered{};  // lately
-        std::size_t next = 0;
-        for_around(t, [&](int q) {
-            const int i = patches_[q];
-            if (!i || std::find(offered.begin(), offered.end(), i) != offered.end()) return;
-            offered[next++ % offered.size()] = i;
-            offer(tiles, t, i);
-        });
-    }
     TileQueue::Entry entry{};
     while (queue_.pop(entry)) {
         const auto [t, i] = entry;
         if (!is_free(tiles, t)) continue;
-        if (image_.residual(tiles.sums(t), patches_.patch(i).surface) >= tile_tolerance * tile_tolerance * limit_)
-            continue;
+        if (level_of(tiles, t, i) == TileQueue::levels) continue;  // the surface has changed meanwhile
         take_tile(tiles, t, i);
         const int row = t / tiles.cols(), col = t % tiles.cols();
         for (const auto& [inside, beside] :
              {std::make_pair(row > 0, t - tiles.cols()), std::make_pair(row + 1 < tiles.rows(), t + tiles.cols()),
               std::make_pair(col > 0, t - 1), std::make_pair(col + 1 < tiles.cols(), t + 1)})
-            if (inside && is_free(tiles, beside)) offer(tiles, beside, i);
+            if (inside && is_free(tiles, beside)) {
+                const int level = level_of(tiles, beside, i);
+                if (level < TileQueue::levels) queue_.push(level, {beside, i});
+            }
     }
     for (const int t : taken_)
         for_around(t, [&](int q) {
@@ -186,10 +196,32 @@ Grower::Choice Grower::choose(int p) const {
 template <class F>
 void Grower::for_front(F&& body) {
     const int size = static_cast<int>(front_.size());
-    if (size >= worth_threads)
+    if (front_.size() >= worth_threads)
         parallel_for(size, patches_.team(), body);
     else
         body(0, size, 0);
+}
+
+// Choices become true. Every patch belongs to one thread, which adds its pixels in order.
+void Grower::commit(bool refit) {
+    const int threads = front_.size() >= worth_threads ? patches_.team().size() : 1;
+    const auto of_thread = [&](int thread) {
+        for (std::size_t k = 0; k < front_.size(); ++k) {
+            const int p = front_[k], i = choices_[k].patch;
+            if (i % threads != thread) continue;
+            waiting_[p] = 0;
+            if (!i) continue;
+            patches_.take(p, i);
+            if (!refit) continue;
+            Patch& patch = patches_.patch(i);
+            patch.sums.add(image_.sample(p));
+            refit_when_due(patch);
+        }
+    };
+    if (threads > 1)
+        patches_.team().run(of_thread);
+    else
+        of_thread(0);
 }
 
 // Returns how many pixels were taken.
@@ -201,23 +233,15 @@ int Grower::over_pixels(int rounds, bool refit) {
             for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k)
                 choices_[k] = patches_.is_free(front_[k], reach_) ? choose(front_[k]) : Choice{};
         });
-        for (std::size_t k = 0; k < front_.size(); ++k) {
-            const int p = front_[k], i = choices_[k].patch;
-            waiting_[p] = 0;
-            if (!i) continue;
-            ++count;
-            patches_.take(p, i);
-            if (!refit) continue;
-            Patch& patch = patches_.patch(i);
-            patch.sums.add(image_.sample(p));
-            refit_when_due(patch);
-        }
+        commit(refit);
         next_.swap(front_);
         front_.clear();
         for (std::size_t k = 0; k < next_.size(); ++k)
-            if (choices_[k].patch)
+            if (choices_[k].patch) {
+                ++count;
                 for (const int step : image_.neighbours())
                     if (patches_.is_free(next_[k] + step, reach_)) wait(next_[k] + step);
+            }
     }
     return count;
 }

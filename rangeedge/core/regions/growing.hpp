@@ -21,6 +21,7 @@ public:
     Tiles(const SurfaceImage& image, int size);
     int rows() const { return rows_; }
     int cols() const { return cols_; }
+    int count() const { return rows_ * cols_; }
     int index(int row, int col) const { return row * cols_ + col; }
     // Whether all pixels are open; only then it has sums.
     bool is_open(int t) const { return sums_[t].count() > 0; }
@@ -97,10 +98,11 @@ private:
     void over_tiles(const Tiles& tiles);
     int over_pixels(int rounds, bool refit);
     bool is_free(const Tiles& tiles, int t) const;
-    void offer(const Tiles& tiles, int t, int i);
+    int level_of(const Tiles& tiles, int t, int i) const;
     void take_tile(const Tiles& tiles, int t, int i);
     void refit_when_due(Patch& patch);
     Choice choose(int p) const;
+    void commit(bool refit);
     void wait(int p);
     template <class F>
     void for_front(F&& body);

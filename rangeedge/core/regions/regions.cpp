@@ -22,7 +22,7 @@ namespace rangeedge {
 namespace {
 
 constexpr double sure = 2.5;  // rms of a surface among edges that are none, in standard deviations
-constexpr double loose = 2;  // pixels of edges and borders may lie farther off their surface, by this factor
+constexpr double loose = 2;   // pixels of edges and borders may lie farther off their surface, by this factor
 
 // Components of what is free up to `reach` with all its neighbours become patches, if their surfaces lie within `limit`
 // standard deviations of their pixels. Returns whether there are any.

@@ -21,7 +21,7 @@ struct Range {
 
 SurfaceImage::SurfaceImage(const RangeMap& map, double lateral, Team& team)
     : rows_(map.rows), cols_(map.cols), projective_(map.projective), lateral_(lateral), offset_(map.offset),
-      to_plane_(map.to_plane), pixel_(static_cast<std::size_t>(size())),
+      to_plane_(map.to_plane), pixel_(new Pixel[static_cast<std::size_t>(size())]),
       state_(static_cast<std::size_t>(size()), none) {
     Array<Range> ranges(static_cast<std::size_t>(team.size()));
     parallel_for(rows_ * cols_, team, [&](int begin, int end, int thread) {
@@ -50,20 +50,22 @@ SurfaceImage::SurfaceImage(const RangeMap& map, double lateral, Team& team)
     std::vector<double> sigmas;
     for (int k = 0; k < rows_ * cols_; k += sigmas.empty() ? 1 : sample_step - k % sample_step)
         if (std::isfinite(map.ordinate[k])) sigmas.push_back(sigma(k));
-    if (sigmas.empty()) return;
+    if (sigmas.empty()) sigmas.push_back(1);
     const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
     std::nth_element(sigmas.begin(), middle, sigmas.end());
     unit_ = *middle;
     const double per_unit = 1 / unit_;
-    parallel_for(rows_, team, [&](int first, int last, int) {
-        for (int row = first; row < last; ++row)
+    // Every thread writes its rows first, so that it also is the one that has their memory allocated.
+    parallel_for(rows_ + 2, team, [&](int first, int last, int) {
+        std::fill_n(&pixel_[static_cast<std::size_t>(first * stride())], (last - first) * stride(), Pixel{});
+        for (int row = std::max(first - 1, 0); row < std::min(last - 1, rows_); ++row)
             for (int col = 0; col < cols_; ++col) {
                 const int k = row * cols_ + col, p = index(row, col);
                 if (!std::isfinite(map.ordinate[k])) continue;
                 const double s = sigma(k) * per_unit;
-                pixel_[p] = {map.x ? map.x[k] : static_cast<float>(col), map.y ? map.y[k] : static_cast<float>(row),
-                             static_cast<float>(static_cast<double>(map.ordinate[k]) * per_unit),
-                             static_cast<float>(s * s)};
+                pixel_[static_cast<std::size_t>(p)] = {
+                    map.x ? map.x[k] : static_cast<float>(col), map.y ? map.y[k] : static_cast<float>(row),
+                    static_cast<float>(static_cast<double>(map.ordinate[k]) * per_unit), static_cast<float>(s * s)};
                 state_[p] = map.edges && map.edges[k] ? edge_pixel : plain;
             }
     });

@@ -4,7 +4,9 @@
 
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "../parallel.hpp"
@@ -63,7 +65,7 @@ public:
     void set_correlation(double correlation, double area) { correlation_ = correlation, correlation_area_ = area; }
 
     Sample sample(int p) const {
-        const Pixel& s = pixel_[p];
+        const Pixel& s = at(p);
         return {static_cast<double>(s.x), static_cast<double>(s.y), static_cast<double>(s.ordinate),
                 1 / static_cast<double>(s.variance)};
     }
@@ -71,7 +73,7 @@ public:
     // Square of the distance of a pixel from a surface in standard deviations: of the noise over a region, and of the
     // pixel's place.
     double residual(int p, const Surface& s) const {
-        const Pixel& pixel = pixel_[p];
+        const Pixel& pixel = at(p);
         const double x = static_cast<double>(pixel.x), y = static_cast<double>(pixel.y);
         if (!s.curved) {
             const double d = static_cast<double>(pixel.ordinate) - s.value_on_plane(x, y);
@@ -103,6 +105,7 @@ private:
         float x, y, ordinate, variance;
     };
 
+    const Pixel& at(int p) const { return pixel_[static_cast<std::size_t>(p)]; }
     double variance(double variance, double slope_x, double slope_y) const {
         return correlation_ * correlation_ * variance + lateral_ * lateral_ * (slope_x * slope_x + slope_y * slope_y);
     }
@@ -112,7 +115,7 @@ private:
     bool projective_;
     double lateral_, offset_, unit_ = 1, correlation_ = 1, correlation_area_ = 1;
     std::array<double, 6> to_plane_;
-    Array<Pixel> pixel_;
+    std::unique_ptr<Pixel[]> pixel_;
     Array<std::uint8_t> state_;
 };
 
