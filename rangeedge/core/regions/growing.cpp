@@ -21,58 +21,15 @@ constexpr std::size_t worth_threads = 2048;  // pixels
 
 }  // namespace
 
-Tiles::Tiles(const SurfaceImage& image, int size)
-    : side(size), rows_(image.rows() / side), cols_(image.cols() / side),
-      sums_(static_cast<std::size_t>(rows_ * cols_)), first_(sums_.size()) {
-    for (int t = 0; t < rows_ * cols_; ++t) first_[t] = image.index(t / cols_ * side, t % cols_ * side);
-}
-
-TilePyramid::TilePyramid(const SurfaceImage& image, Team& team) : large(image, 8), small(image, 4) {
-    parallel_for(small.rows(), team, [&](int begin, int end, int) {
-        for (int t = small.index(begin, 0); t < small.index(end, 0); ++t) small.add_up(image, t);
-    });
-    parallel_for(large.rows(), team, [&](int begin, int end, int) {
-        for (int row = begin; row < end; ++row)
-            for (int col = 0; col < large.cols(); ++col) large.add_up(small, row, col);
-    });
-}
-
-void Tiles::add_up(const SurfaceImage& image, int t) {
-    const auto all = [&](auto&& visit) {
-        for (int row = 0; row < side; ++row)
-            for (int p = first_[t] + row * image.stride(), stop = p + side; p < stop; ++p)
-                if (!visit(p)) return false;
-        return true;
-    };
-    if (!all([&](int p) { return image.open(p); })) return;
-    const Sample middle = image.sample(first_[t] + (side / 2) * (image.stride() + 1));
-    SurfaceSums sums(middle.x, middle.y, middle.ordinate);
-    all([&](int p) {
-        sums.add(image.sample(p));
-        return true;
-    });
-    sums_[t] = sums;
-}
-
-void Tiles::add_up(const Tiles& quarters, int row, int col) {
-    const int t = quarters.index(2 * row, 2 * col), below = t + quarters.cols();
-    for (const int q : {t, t + 1, below, below + 1})
-        if (!quarters.is_open(q)) return;
-    SurfaceSums sums = quarters.sums(t);
-    for (const int q : {t + 1, below, below + 1}) sums.add(quarters.sums(q));
-    sums_[index(row, col)] = sums;
-}
-
 Grower::Grower(PatchMap& patches)
-    : patches_(patches), image_(patches.image()), tiles_(image_, patches.team()),
-      waiting_(static_cast<std::size_t>(image_.size()), 0) {}
+    : patches_(patches), image_(patches.image()), waiting_(static_cast<std::size_t>(image_.size()), 0) {}
 
 void Grower::grow(double tolerance) {
     start(PatchMap::open_pixel, tolerance);
     // Tiles are worth another look where many pixels have come.
     do {
-        over_tiles(tiles_.large);
-        over_tiles(tiles_.small);
+        over_tiles(patches_.tiles().large);
+        over_tiles(patches_.tiles().small);
     } while (over_pixels(rounds_between_tiles, true) > worth_tiles);
     over_pixels(image_.size(), true);
     patches_.refit();

@@ -12,32 +12,6 @@
 
 namespace rangeedge {
 
-// Square tiles of pixels and the power sums of those that have no edge, from which the misfit of a tile to any surface
-// is a few operations.
-class Tiles {
-public:
-    const int side;  // pixels: 4 or 8
-
-    Tiles(const SurfaceImage& image, int size);
-    int rows() const { return rows_; }
-    int cols() const { return cols_; }
-    int count() const { return rows_ * cols_; }
-    int index(int row, int col) const { return row * cols_ + col; }
-    // Whether all pixels are open; only then it has sums.
-    bool is_open(int t) const { return sums_[t].count() > 0; }
-    const SurfaceSums& sums(int t) const { return sums_[t]; }
-    int first_pixel(int t) const { return first_[t]; }
-
-    // Sums of a tile from its pixels, or from the four smaller tiles that it consists of, if all of these are open.
-    void add_up(const SurfaceImage& image, int t);
-    void add_up(const Tiles& quarters, int row, int col);
-
-private:
-    int rows_, cols_;
-    Array<SurfaceSums> sums_;
-    Array<int> first_;
-};
-
 // Tiles and patches by the misfit of one to the other, the smallest first, first come first served among equals.
 class TileQueue {
 public:
@@ -68,11 +42,6 @@ private:
     std::array<std::vector<Entry>, levels> bucket_;
     std::array<std::size_t, levels> head_{};
     std::size_t lowest_ = levels;
-};
-
-struct TilePyramid {
-    Tiles large, small;
-    TilePyramid(const SurfaceImage& image, Team& team);
 };
 
 // Grows the patches of one image. What it allocates is as large as the image, so it is made once.
@@ -109,7 +78,6 @@ private:
 
     PatchMap& patches_;
     const SurfaceImage& image_;
-    TilePyramid tiles_;
     PatchMap::Free reach_ = PatchMap::open_pixel;
     double limit_ = 0;  // of squared residuals
     TileQueue queue_;

@@ -8,7 +8,6 @@
 
 #include "roof.hpp"
 #include "tasks.hpp"
-#include "tile_noise.hpp"
 
 namespace rangeedge {
 namespace {
@@ -20,13 +19,13 @@ constexpr double correlation_max = 8.0;  // noise over a region, in units of tha
 }  // namespace
 
 PatchMap::PatchMap(const RangeMap& map, Team& team)
-    : image_(map, lateral_deviation, team), team_(team), label_(static_cast<std::size_t>(image_.size()), 0),
-      free_(label_.size(), taken) {
+    : image_(map, lateral_deviation, team), tiles_(image_, team), team_(team),
+      label_(static_cast<std::size_t>(image_.size()), 0), free_(label_.size(), taken) {
     parallel_for(image_.rows(), team_, [&](int first, int last, int) {
         for (int p = image_.index(first, 0), end = image_.index(last, 0); p < end; ++p) release(p);
     });
     create({});
-    const TileNoise noise = tile_noise(image_, team_);
+    const TileNoise noise = tile_noise(tiles_);
     image_.set_correlation(std::min(noise.deviation, correlation_max), noise.area);
 }
 

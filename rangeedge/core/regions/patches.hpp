@@ -12,6 +12,7 @@
 #include "array.hpp"
 #include "surface.hpp"
 #include "surface_image.hpp"
+#include "tiles.hpp"
 
 namespace rangeedge {
 
@@ -34,6 +35,7 @@ public:
 
     SurfaceImage& image() { return image_; }
     const SurfaceImage& image() const { return image_; }
+    const TilePyramid& tiles() const { return tiles_; }
     Team& team() { return team_; }
 
     int count() const { return patches_.count(); }
@@ -126,6 +128,7 @@ private:
     void create(const Piece& piece);
 
     SurfaceImage image_;
+    TilePyramid tiles_;
     Team& team_;
     Array<int> label_;
     Array<std::uint8_t> free_;

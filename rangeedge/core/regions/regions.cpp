@@ -92,8 +92,8 @@ int grow_regions(const RangeMap& map, const std::int32_t* markers, const RegionP
     patches.add_markers(markers);
     Grower grower(patches);
     grow(patches, grower, parameters.tolerance);
-    for (int round = 0; parameters.new_seeds && round < 2; ++round)
-        if (add_uncovered(patches, PatchMap::open_pixel, HUGE_VAL)) grow(patches, grower, parameters.tolerance);
+    if (parameters.new_seeds && add_uncovered(patches, PatchMap::open_pixel, HUGE_VAL))
+        grow(patches, grower, parameters.tolerance);
     Adjacency between_edges(patches, tolerance);
     merge(patches, between_edges);
     patches.flatten();

@@ -62,7 +62,8 @@ public:
 
     int count() const { return count_; }
     double weight() const { return power_[0]; }
-    // The mean place.
+    // The mean ordinate, and the mean place.
+    double mean_ordinate() const { return base_ + (power_[0] > 0 ? product_[0] / power_[0] : 0); }
     double mean_x() const { return x0_ + (power_[0] > 0 ? power_[1] / power_[0] : 0); }
     double mean_y() const { return y0_ + (power_[0] > 0 ? power_[2] / power_[0] : 0); }
 
