@@ -17,6 +17,7 @@ constexpr double tile_tolerance = 0.8;       // root mean square misfit of a til
 constexpr int rounds_between_tiles = 8;      // of pixels
 constexpr int worth_tiles = 500;             // pixels that grew meanwhile
 constexpr int most_adjustments = 8;          // rounds at borders
+constexpr std::size_t prefetched = 12;    // pixels ahead
 constexpr std::size_t worth_threads = 2048;  // pixels
 
 }  // namespace
@@ -149,14 +150,20 @@ Grower::Choice Grower::choose(int p) const {
     return best;
 }
 
-// Calls body(begin, end, .) for parts of front_.
+// Calls visit(k) for all k of front_, in parallel if they are many.
 template <class F>
-void Grower::for_front(F&& body) {
+void Grower::for_front(F&& visit) {
+    const auto visit_all = [&](int begin, int end, int) {
+        for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+            patches_.prefetch(front_[std::min(k + prefetched, front_.size() - 1)]);
+            visit(k);
+        }
+    };
     const int size = static_cast<int>(front_.size());
     if (front_.size() >= worth_threads)
-        parallel_for(size, patches_.team(), body);
+        parallel_for(size, patches_.team(), visit_all);
     else
-        body(0, size, 0);
+        visit_all(0, size, 0);
 }
 
 // Choices become true. Every patch belongs to one thread, which adds its pixels in order.
@@ -165,6 +172,7 @@ void Grower::commit(bool refit) {
     const auto of_thread = [&](int thread) {
         for (std::size_t k = 0; k < front_.size(); ++k) {
             const int p = front_[k], i = choices_[k].patch;
+            patches_.prefetch(front_[std::min(k + prefetched, front_.size() - 1)]);
             if (i % threads != thread) continue;
             waiting_[p] = 0;
             if (!i) continue;
@@ -186,9 +194,8 @@ int Grower::over_pixels(int rounds, bool refit) {
     int count = 0;
     for (int round = 0; round < rounds && !front_.empty(); ++round) {
         choices_.resize(front_.size());
-        for_front([&](int begin, int end, int) {
-            for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k)
-                choices_[k] = patches_.is_free(front_[k], reach_) ? choose(front_[k]) : Choice{};
+        for_front([&](std::size_t k) {
+            choices_[k] = patches_.is_free(front_[k], reach_) ? choose(front_[k]) : Choice{};
         });
         commit(refit);
         next_.swap(front_);
@@ -211,19 +218,17 @@ void Grower::adjust_borders() {
     });
     for (int round = 0; round < most_adjustments && !front_.empty(); ++round) {
         choices_.resize(front_.size());
-        for_front([&](int begin, int end, int) {
-            for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
-                const int p = front_[k], own = patches_[p];
-                Choice best{own, -1};
-                for (const int step : image_.neighbours()) {
-                    const int other = patches_[p + step];
-                    if (!own || !other || other == best.patch || other == own) continue;
-                    if (best.residual < 0) best.residual = image_.residual(p, patches_.patch(own).surface);
-                    const double r = image_.residual(p, patches_.patch(other).surface);
-                    if (r < best.residual) best = {other, r};
-                }
-                choices_[k] = best;
+        for_front([&](std::size_t k) {
+            const int p = front_[k], own = patches_[p];
+            Choice best{own, -1};
+            for (const int step : image_.neighbours()) {
+                const int other = patches_[p + step];
+                if (!own || !other || other == best.patch || other == own) continue;
+                if (best.residual < 0) best.residual = image_.residual(p, patches_.patch(own).surface);
+                const double r = image_.residual(p, patches_.patch(other).surface);
+                if (r < best.residual) best = {other, r};
             }
+            choices_[k] = best;
         });
         next_.swap(front_);
         front_.clear();

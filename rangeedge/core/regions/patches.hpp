@@ -50,6 +50,12 @@ public:
         return n == 8 ? !std::memcmp(&free_[p], open, 8) : !std::memcmp(&free_[p], open, 4);
     }
 
+    void prefetch(int p) const {
+        image_.prefetch(p);
+        __builtin_prefetch(&label_[p - image_.stride()]);
+        __builtin_prefetch(&label_[p + image_.stride()]);
+    }
+
     void take(int p, int i) { label_[p] = i, free_[p] = taken; }
     void release(int p) {
         label_[p] = 0;
