@@ -17,7 +17,7 @@ constexpr double tile_tolerance = 0.8;       // root mean square misfit of a til
 constexpr int rounds_between_tiles = 8;      // of pixels
 constexpr int worth_tiles = 500;             // pixels that grew meanwhile
 constexpr int most_adjustments = 8;          // rounds at borders
-constexpr std::size_t prefetched = 12;    // pixels ahead
+constexpr std::size_t prefetched = 12;       // pixels ahead
 constexpr std::size_t worth_threads = 2048;  // pixels
 
 }  // namespace
@@ -65,8 +65,8 @@ void Grower::refit_when_due(Patch& patch) {
 
 bool Grower::is_free(const Tiles& tiles, int t) const {
     if (!tiles.is_open(t)) return false;
-    for (int row = 0, p = tiles.first_pixel(t); row < tiles.side; ++row, p += image_.stride())
-        if (!patches_.are_open(p, tiles.side)) return false;
+    for (int row = 0, p = tiles.first_pixel(t); row < tiles.side(); ++row, p += image_.stride())
+        if (!patches_.are_open(p, tiles.side())) return false;
     return true;
 }
 
@@ -81,15 +81,15 @@ void Grower::take_tile(const Tiles& tiles, int t, int i) {
     Patch& patch = patches_.patch(i);
     patch.sums.add(tiles.sums(t));
     refit_when_due(patch);
-    for (int row = 0; row < tiles.side; ++row)
-        for (int p = tiles.first_pixel(t) + row * image_.stride(), end = p + tiles.side; p < end; ++p)
+    for (int row = 0; row < tiles.side(); ++row)
+        for (int p = tiles.first_pixel(t) + row * image_.stride(), end = p + tiles.side(); p < end; ++p)
             patches_.take(p, i);
     taken_.push_back(t);
 }
 
 // Offers every free tile to the patches that touch it, and those around it in turn.
 void Grower::over_tiles(const Tiles& tiles) {
-    const int stride = image_.stride(), side = tiles.side;
+    const int stride = image_.stride(), side = tiles.side();
     const auto for_around = [&](int t, auto&& visit) {  // the pixels around a tile
         const int p = tiles.first_pixel(t);
         for (int k = 0; k < side; ++k) visit(p - stride + k);
@@ -194,9 +194,8 @@ int Grower::over_pixels(int rounds, bool refit) {
     int count = 0;
     for (int round = 0; round < rounds && !front_.empty(); ++round) {
         choices_.resize(front_.size());
-        for_front([&](std::size_t k) {
-            choices_[k] = patches_.is_free(front_[k], reach_) ? choose(front_[k]) : Choice{};
-        });
+        for_front(
+            [&](std::size_t k) { choices_[k] = patches_.is_free(front_[k], reach_) ? choose(front_[k]) : Choice{}; });
         commit(refit);
         next_.swap(front_);
         front_.clear();

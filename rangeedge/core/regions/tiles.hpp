@@ -9,34 +9,38 @@
 
 namespace rangeedge {
 
-// Square tiles of pixels and the power sums of those that have no edge, from which the misfit of a tile to any surface
-// is a few operations.
+// A grid of square tiles of pixels. Those without an edge are open, and have power sums, from which the misfit of a tile
+// to any surface is a few operations.
 class Tiles {
 public:
-    const int side;  // pixels: 4 or 8
+    Tiles(const SurfaceImage& image, int side);
 
-    Tiles(const SurfaceImage& image, int size);
+    int side() const { return side_; }
     int rows() const { return rows_; }
     int cols() const { return cols_; }
     int count() const { return rows_ * cols_; }
     int index(int row, int col) const { return row * cols_ + col; }
-    // Whether all pixels are open; only then it has sums.
+    int first_pixel(int t) const { return image_.index(t / cols_ * side_, t % cols_ * side_); }
     bool is_open(int t) const { return open_[t]; }
-    const SurfaceSums& sums(int t) const { return sums_[t]; }
-    int first_pixel(int t) const { return first_[t]; }
+    // The mean ordinate of an open tile, in standard deviations of a pixel.
+    double mean(int t) const { return mean_[t]; }
+    SurfaceSums sums(int t) const { return sums_.empty() ? add_up(t) : sums_[t]; }
 
-    // Sums of a tile from its pixels, or from the four smaller tiles that it consists of, if all of these are open.
-    void add_up(const SurfaceImage& image, int t);
-    void add_up(const Tiles& quarters, int row, int col);
+    // Sums of the pixels of a tile, none if it is not open.
+    SurfaceSums add_up(int t) const;
+    // Notes that a tile has these sums, and keeps them if `keep` was called before.
+    void set(int t, const SurfaceSums& sums);
+    void keep() { sums_.resize(open_.size()); }
 
 private:
-    int rows_, cols_;
-    Array<SurfaceSums> sums_;
-    Array<int> first_;
+    const SurfaceImage& image_;
+    int side_, rows_, cols_;
     Array<std::uint8_t> open_;
+    Array<double> mean_;
+    Array<SurfaceSums> sums_;
 };
 
-// Tiles of 8 x 8 pixels, and of 4 x 4.
+// Tiles of 8 x 8 pixels, and of 4 x 4. Only the large ones keep their sums, which are the sums of small ones.
 struct TilePyramid {
     Tiles large, small;
     TilePyramid(const SurfaceImage& image, Team& team);
