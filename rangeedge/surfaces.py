@@ -22,10 +22,12 @@ def surface_map(frame: RangeFrame, coefficients: tuple[float, ...], noise_map: n
     x, y, to_plane = _places(frame)
     seen = frame.ordinate[frame.valid.view(bool)]
     offset = float(seen[:: max(1, len(seen) // 4096)].mean(dtype=np.float64)) if len(seen) else 0.0
+    with np.errstate(invalid="ignore", over="ignore"):  # signalling NaN; beyond single precision
+        ordinate = (frame.ordinate - frame.ordinate.dtype.type(offset)).astype(np.float32, copy=False)
     return dict(
         x=x,
         y=y,
-        ordinate=(frame.ordinate - frame.ordinate.dtype.type(offset)).astype(np.float32, copy=False),
+        ordinate=ordinate,
         offset=offset,
         rounding=float(np.spacing(np.abs(frame.ordinate.dtype.type(offset)))),
         projective=frame.projective,

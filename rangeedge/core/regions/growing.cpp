@@ -45,10 +45,17 @@ void Grower::fill(double tolerance) {
 void Grower::start(PatchMap::Free reach, double tolerance) {
     reach_ = reach;
     limit_ = tolerance * tolerance;
-    patches_.for_free(reach, [&](int p) {
-        for (const int step : image_.neighbours())
-            if (patches_[p + step]) return wait(p);
+    std::vector<std::vector<int>> found(static_cast<std::size_t>(patches_.team().size()));
+    parallel_for(image_.rows(), patches_.team(), [&](int first, int last, int thread) {
+        patches_.for_free(first, last, reach, [&](int p) {
+            bool touches = false;
+            for (const int step : image_.neighbours()) touches = touches || patches_[p + step];
+            if (touches) found[static_cast<std::size_t>(thread)].push_back(p);
+        });
     });
+    front_.clear();
+    for (const auto& of_thread : found)
+        for (const int p : of_thread) wait(p);
 }
 
 void Grower::wait(int p) {

@@ -105,10 +105,10 @@ public:
                     if (label[k] != label[k + 1] || label[k] != label[k + stride]) visit(p + k);
             }
     }
-    // Free pixels, in raster order; most images have few.
+    // Free pixels of rows [first, last), in raster order; most images have few.
     template <class F>
-    void for_free(Free reach, F&& visit) const {
-        for (int p = 0, end = free_.count(); p < end;) {
+    void for_free(int first, int last, Free reach, F&& visit) const {
+        for (int p = image_.index(first, 0), end = image_.index(last, 0); p < end;) {
             std::uint64_t eight = 1;
             if (p + 8 <= end) std::memcpy(&eight, &free_[p], sizeof eight);
             const int stop = eight ? std::min(p + 8, end) : p;

@@ -31,12 +31,15 @@ bool add_uncovered(PatchMap& patches, PatchMap::Free reach, double limit) {
     const auto is_free = [&](int p) { return patches.is_free(p, reach); };
     const auto in_row = [&](int p) { return is_free(p - 1) && is_free(p) && is_free(p + 1); };
     Array<std::uint8_t> inside(static_cast<std::size_t>(image.size()), 0);
-    bool any = false;
-    patches.for_free(reach, [&](int p) {
-        inside[p] = in_row(p - image.stride()) && in_row(p) && in_row(p + image.stride());
-        any |= inside[p] != 0;
+    std::vector<char> any(static_cast<std::size_t>(patches.team().size()), 0);
+    parallel_for(image.rows(), patches.team(), [&](int first, int last, int thread) {
+        char& found = any[static_cast<std::size_t>(thread)];
+        patches.for_free(first, last, reach, [&](int p) {
+            inside[p] = in_row(p - image.stride()) && in_row(p) && in_row(p + image.stride());
+            found = found || inside[p];
+        });
     });
-    if (!any) return false;
+    if (std::none_of(any.begin(), any.end(), [](char found) { return found; })) return false;
     const Components parts(inside.data(), image.rows(), image.cols());
     std::vector<Pixels> sets(static_cast<std::size_t>(parts.count()));
     for (int i = 0; i < parts.count(); ++i)
