@@ -119,6 +119,32 @@ class TestGrowing:
         markers = markers_at(STEP.shape, (slice(30, 50), slice(10, 30)))
         one_region_each(growRegions(STEP, markers, noise=SIGMA, newSeeds=True), np.s_[:, :50], np.s_[:, 50:])
 
+    def test_edges_too_dense_to_be_any(self):
+        # A face of which half the pixels are edges, as of a surface seen at a grazing angle.
+        edges = np.zeros(STEP.shape, np.uint8)
+        edges[:, 50:] = np.random.default_rng(1).random((80, 70)) < 0.5
+        markers = markers_at(STEP.shape, (slice(30, 50), slice(10, 30)))
+        labels = growRegions(STEP, markers, edges=edges, noise=SIGMA, newSeeds=True)
+        one_region_each(labels, np.s_[:, :50], np.s_[:, 50:])
+        assert not growRegions(STEP, markers, edges=edges, noise=SIGMA)[:, 50:].any()
+
+    def test_edges_on_a_smooth_surface_do_not_part_it(self):
+        src = noisy(columns(0.2 * X))
+        edges = np.zeros(src.shape, np.uint8)
+        edges[:, 60] = 255
+        markers = markers_at(src.shape, (slice(30, 50), slice(10, 30)), (slice(30, 50), slice(90, 110)))
+        assert (growRegions(src, markers, edges=edges, noise=SIGMA) == 1).all()
+
+    @pytest.mark.parametrize("seed", range(3))
+    def test_noise_with_long_waves(self, seed):
+        # Neighbours err together over some 10 pixels, by 8 times what each errs by itself; markers are no larger.
+        rng = np.random.default_rng(seed)
+        waves = cv2.GaussianBlur(rng.normal(size=(160, 240)), (0, 0), 5)
+        src = columns(0.1 * np.arange(240), 160) + 8 * SIGMA * waves / waves.std() + rng.normal(0, SIGMA, waves.shape)
+        rows, cols = np.indices(src.shape)
+        markers = np.where((rows % 20 < 10) & (cols % 20 < 10), 1 + rows // 20 * 12 + cols // 20, 0).astype(np.int32)
+        assert (growRegions(src, markers, noise=SIGMA, newSeeds=True) == 1).mean() > 0.99
+
     def test_no_markers(self):
         assert not growRegions(STEP, np.zeros(STEP.shape, np.int32)).any()
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
 namespace rangeedge {
@@ -16,19 +17,40 @@ constexpr std::size_t least_differences = 64;
 // flight and of registered images does not, since neighbours err together. How far the means of tiles deviate is found
 // as the noise of pixels is: third differences along rows and columns of tiles vanish on every quadratic, and are
 // sqrt(20) times the deviation of a mean elsewhere. Edges are many among tiles, so the smallest quarter counts. Tiles
-// of 4 and of 8 pixels see waves of about that length; their variances add up.
-double variance_of_means(const Tiles& tiles) {
+// of 4, 8 and 16 pixels see waves of about that length; their variances add up.
+// Means of the open tiles of a grid, NaN of the others.
+struct Means {
+    int rows, cols;
+    Array<double> mean;
+
+    explicit Means(const Tiles& tiles)
+        : rows(tiles.rows()), cols(tiles.cols()), mean(static_cast<std::size_t>(tiles.count())) {
+        for (int t = 0; t < tiles.count(); ++t)
+            mean[t] = tiles.is_open(t) ? tiles.mean(t) : std::numeric_limits<double>::quiet_NaN();
+    }
+    // Of tiles twice as large.
+    Means doubled() const {
+        Means m = *this;
+        m.rows = rows / 2, m.cols = cols / 2;
+        for (int t = 0; t < m.rows * m.cols; ++t) {
+            const int k = t / m.cols * 2 * cols + t % m.cols * 2;
+            m.mean[t] = (mean[k] + mean[k + 1] + mean[k + cols] + mean[k + cols + 1]) / 4;
+        }
+        return m;
+    }
+    double variance() const;
+};
+
+double Means::variance() const {
     std::vector<double> differences;
     const auto add = [&](int t, int step) {
-        for (int k = 0; k < 4; ++k)
-            if (!tiles.is_open(t + k * step)) return;
-        differences.push_back(std::abs(tiles.mean(t) - 3 * tiles.mean(t + step) + 3 * tiles.mean(t + 2 * step) -
-                                       tiles.mean(t + 3 * step)));
+        const double d = mean[t] - 3 * mean[t + step] + 3 * mean[t + 2 * step] - mean[t + 3 * step];
+        if (!std::isnan(d)) differences.push_back(std::abs(d));
     };
-    for (int row = 0; row < tiles.rows(); ++row)
-        for (int col = 0; col < tiles.cols(); ++col) {
-            if (col + 3 < tiles.cols()) add(tiles.index(row, col), 1);
-            if (row + 3 < tiles.rows()) add(tiles.index(row, col), tiles.cols());
+    for (int row = 0; row < rows; ++row)
+        for (int col = 0; col < cols; ++col) {
+            if (col + 3 < cols) add(row * cols + col, 1);
+            if (row + 3 < rows) add(row * cols + col, cols);
         }
     if (differences.size() < least_differences) return 0;
     const auto quarter = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 4);
@@ -86,9 +108,10 @@ TilePyramid::TilePyramid(const SurfaceImage& image, Team& team) : large(image, 8
 }
 
 TileNoise tile_noise(const TilePyramid& tiles) {
-    const double of_small = variance_of_means(tiles.small), of_large = variance_of_means(tiles.large);
-    const double variance = 1 + of_small + of_large;
-    return {std::sqrt(variance), std::max(1.0, tiles.large.side() * tiles.large.side() * of_large / variance)};
+    const Means of_8(tiles.large);
+    const double at_4 = Means(tiles.small).variance(), at_8 = of_8.variance(), at_16 = of_8.doubled().variance();
+    const double variance = 1 + at_4 + at_8 + at_16;
+    return {std::sqrt(variance), std::max({1.0, 64 * at_8 / variance, 256 * at_16 / variance})};
 }
 
 }  // namespace rangeedge
