@@ -19,8 +19,8 @@ void label_statistics(const LabelImage& image, int threads, std::int32_t* boxes,
 constexpr int moment_count = 35;  // of x^i y^j z^k, i + j + k <= 4
 
 // For every label but 0, of the points (3 coordinates each) of its pixels: the middle of their box in `origins` (3
-// each) and half its largest side in `scales`; the means of x^i y^j z^k of (point - origin) / scale in `moments`, by rising
-// degree, then falling i, then falling j. `curved` says whether a quadratic over columns and rows describes the
+// each) and half its largest side in `scales`; the means of x^i y^j z^k of (point - origin) / scale in `moments`, by
+// rising degree, then falling i, then falling j. `curved` says whether a quadratic over columns and rows describes the
 // ordinates much better than a plane.
 void region_moments(const LabelImage& image, const double* points, const double* ordinate, int threads, double* origins,
                     double* scales, double* moments, std::uint8_t* curved);

@@ -9,8 +9,8 @@
 
 namespace rangeedge {
 
-// A grid of square tiles of pixels. Those without an edge are open, and have power sums, from which the misfit of a tile
-// to any surface is a few operations.
+// A grid of square tiles of pixels. Those without an edge are open, and have power sums, from which the misfit of a
+// tile to any surface is a few operations.
 class Tiles {
 public:
     Tiles(const SurfaceImage& image, int side);
