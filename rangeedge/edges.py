@@ -162,8 +162,9 @@ def edgeStrength(
         jump = |z1(x) - z2(x)|,  crease = the angle between the normals of f1 and f2 at x,
 
     x being the position of the edge; it is their intersection where the pixels allow that, and then jump = 0
-    (paper, 4.2). Both pixels beside the cut receive the strengths, and of several candidates the largest. Surfaces either
-    meet at a pixel or do not: a jump pixel has no crease, and of candidates for both the most significant decides.
+    (paper, 4.2). Both pixels beside the cut receive the strengths, and of several candidates the largest. Surfaces
+    either meet at a pixel or do not: a jump pixel has no crease, and of candidates for both the most significant
+    decides.
     A step that is smeared over up to `maxSmear` pixels is one jump of its full height between the pixels beside them
     (`flyingPixels`). No jump exceeds the depths of the pixels around it.
 

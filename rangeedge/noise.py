@@ -48,7 +48,7 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
     retval : NoiseModel
         In the unit of the image. Never below 3e-5 of the distance (of the range of heights on a grid), so that
         the rounding of noise-free images counts as noise, nor below that of rounding to whole units of integers, or
-        to the step of which floats are multiples, step / sqrt(12); that is also what is left where no window is valid.
+        to the step of which depths are multiples, step / sqrt(12); that is also what is left where no window is valid.
 
     Raises
     ------

@@ -234,9 +234,9 @@ class ScanLineParams(Options):
         5,
         _whole(0),
         "int",
-        "Most pixels of a scan line over which a step may be smeared, as interpolation and the footprint of a pixel do, to"
-        " be one jump between the surfaces on either side. They are a surface of their own unless that is steep, or if"
-        " more than two almost parallel to the viewing direction. 0 takes every pixel for a surface.",
+        "Most pixels of a scan line over which a step may be smeared, as interpolation and the footprint of a pixel do,"
+        " to be one jump between the surfaces on either side. They are a surface of their own unless that is steep, or"
+        " if more than two almost parallel to the viewing direction. 0 takes every pixel for a surface.",
         unit="pixels",
         group="scan lines",
     )

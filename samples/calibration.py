@@ -45,11 +45,11 @@ def main(argv=None):
 
 
 def noises(rng):
-    """Noise by its kind, of unit deviation; the smoothest one with a little white noise, as every sensor has it."""
+    """Noise by its kind, of about unit deviation; the smooth ones with some white noise, as sensors have it."""
     kinds = {"white": rng.standard_normal(SHAPE)}
     for radius in (1, 2, 4, 8):
         waves = cv2.GaussianBlur(rng.standard_normal(SHAPE), (0, 0), radius)
-        kinds[f"blurred by {radius}"] = waves / waves.std() + (0.1 * rng.standard_normal(SHAPE) if radius == 8 else 0)
+        kinds[f"blurred by {radius}"] = waves / waves.std() + 0.25 * rng.standard_normal(SHAPE)
     slope = 0.37 * np.arange(SHAPE[1])
     kinds["quantised"] = np.rint(0.7 * rng.standard_normal(SHAPE) + slope)
     return kinds

@@ -57,13 +57,15 @@ def test_a_smeared_step_is_one_jump_of_its_full_height(across, pixels, offset, m
     rim = kind & EDGE_OCCLUDING > 0
     assert rim.any(line).mean() > 0.95 or across == "oblique"
     np.testing.assert_allclose(jump.max(line)[rim.any(line)], 0.1, atol=0.003)
-    assert np.count_nonzero(crease) <= 8
+    # A sample that is mixed by a few per cent belongs to its side and may leave weak creases there, but no line.
+    assert np.count_nonzero(crease) <= 0.01 * crease.size
+    assert not detectEdges(z, K=K)[INNER][np.abs(distance)[INNER] > pixels / 2 + 2.5].any()
     # On the nearer surface, no farther from the middle of the step than half its width and a pixel or two.
     before = -distance[INNER][rim] * (-1 if mirrored else 1)
     assert before.min() > -0.3 * pixels - 0.5
     assert before.max() < pixels / 2 + 2
     # One line, that the detector draws without gaps wherever such lines are not broken by thinning.
-    assert np.ptp(before) < 2.5
+    assert np.ptp(before) < 3
     if across in ("vertical", "horizontal"):
         edges = detectEdges(z, K=K)[INNER] > 0
         assert (edges.sum(line) == 1).mean() >= 0.9
@@ -245,13 +247,14 @@ def test_an_outline_beside_shadow_is_found(shadow):
     assert found == (shadow <= 8)
 
 
-@pytest.mark.parametrize("slope", [0.0, 0.3, 0.9])
-def test_a_hole_in_a_surface_has_no_outline(slope):
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("slope", [0.0, 0.3, 0.6, 0.9])
+def test_a_hole_in_a_surface_has_no_outline(slope, seed):
     # The farther side of a floor that is seen at a grazing angle is much farther, but it runs on to the nearer side.
     z = 1 / (1 - slope * (V - 40) / 50)
     z[30:50, 30:90] = np.nan
-    assert not detectEdges(noisy(z, 0.0003), K=K, noise=0.0003).any()
-    assert not detectEdges(noisy(-z, 0.0003), noise=0.0003, shadowEdges=True, directions=DIR_COLS).any()
+    assert not detectEdges(noisy(z, 0.0003, seed), K=K, noise=0.0003).any()
+    assert not detectEdges(noisy(-z, 0.0003, seed), noise=0.0003, shadowEdges=True, directions=DIR_COLS).any()
 
 
 def test_surfaces_side_by_side_have_no_outline_at_the_hole_between_them():

@@ -21,8 +21,8 @@ from rangeedge import _core
 
 PUBLIC = """
     error RangeImage imreadRange imwriteRange NoiseModel estimateNoise ScanLineParams splitScanLine
-    EdgeStrength edgeStrength edgePoints kindNames flyingPixels strengthImage overallStrength selectEdges thinEdges detectEdges
-    detectEdgesWithStrength
+    EdgeStrength edgeStrength edgePoints kindNames flyingPixels strengthImage overallStrength selectEdges thinEdges
+    detectEdges detectEdgesWithStrength
     ScanLineDetector createScanLineDetector closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
     extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats

@@ -129,14 +129,14 @@ class Detector:
             return None
         ends = [(float(line.x[a]), left.curve), (float(line.x[b]), right.curve)]
         (x, near), (x_far, far) = sorted(ends, key=lambda end: end[1].value(end[0]), reverse=True)
-        y, y_far, below = near.value(x), far.value(x_far), far.value(x)
+        y, y_far, below = near.value(x), far.value(x_far), max(_extended(far, x_far, x))
         if line.projective and not min(y, y_far, below) > 0:
             return None
         if self.image.spaced and line.grazing_angle(a, b) > VEIL:
             return None
         difference = min(y - below, y - y_far)
         if not self.image.spaced:
-            difference = min(difference, near.value(x_far) - y_far)
+            difference = min(difference, min(_extended(near, x, x_far)) - y_far)
         noise = _EdgeNoise(_SideNoise(line, left, a, x), _SideNoise(line, right, b, x))
         if not _is_jump(line, a, b, difference, noise.of_jump("value")):
             return None
@@ -238,6 +238,11 @@ class Detector:
             along=along / unit,
             sides=[(value, slope / unit, variance / unit**2) for value, slope, variance in sides],
         )
+
+
+def _extended(curve, x, to):
+    """To where a curve leads from an abscissa to another one, by itself and straight on."""
+    return curve.value(to), curve.value(x) + curve.slope(x) * (to - x)
 
 
 def _range_around(line, before, after):

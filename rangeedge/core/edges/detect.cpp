@@ -19,10 +19,10 @@
 namespace rangeedge {
 namespace {
 
-constexpr double lone_significance = 3;   // standard deviations that a candidate needs by itself, before its neighbours
-constexpr double lone_jump = 8;             // standard deviations that a jump needs by itself
-constexpr double jump_tolerances = 2;     // tolerances of splitting that a jump exceeds, the error of approximation
-constexpr int least_outlined = 3;         // samples of a surface beside a wide gap
+constexpr double lone_significance = 3;  // standard deviations that a candidate needs by itself, before its neighbours
+constexpr double lone_jump = 8;          // standard deviations that a jump needs by itself
+constexpr double jump_tolerances = 2;    // tolerances of splitting that a jump exceeds, the error of approximation
+constexpr int least_outlined = 3;        // samples of a surface beside a wide gap
 
 // Candidates of some lines, and the pixels over which steps are smeared there.
 struct Found {
@@ -89,8 +89,8 @@ private:
     }
 
     // The jump at the end of the nearer of two surfaces, half a sample beyond it.
-    Candidate measure_outline(const Line<T>& line, const Approximation& a, std::ptrdiff_t i, std::ptrdiff_t j, int before,
-                              int after) const {
+    Candidate measure_outline(const Line<T>& line, const Approximation& a, std::ptrdiff_t i, std::ptrdiff_t j,
+                              int before, int after) const {
         if (!options_.shadows) return {};
         const ShadowStep step = step_across_shadow(line, a.fit(i), a.fit(j), before, after, options_.spaced);
         if (!is_jump(line, before, after, step.difference, step.difference / step.deviation)) return {};

@@ -31,13 +31,15 @@ void keep_lines(const std::uint8_t* edges, int rows, int cols, int min_length, c
             left = std::min(left, parts.col_of(begin)), right = std::max(right, parts.col_of(end - 1));
             top = std::min(top, parts.row_of(begin)), bottom = std::max(bottom, parts.row_of(begin));
             if (!significance) continue;
-            const float* first = significance + static_cast<std::size_t>(parts.row_of(begin)) * width + parts.col_of(begin);
+            const float* first =
+                significance + static_cast<std::size_t>(parts.row_of(begin)) * width + parts.col_of(begin);
             squares = std::inner_product(first, first + (end - begin), first, squares);
             pixels += static_cast<double>(end - begin);
         }
         const int length = std::max(right - left, bottom - top) + 1;
         if (length < min_length) continue;
-        if (significance && !(squares * length >= least_significance * least_significance * usual_length * pixels)) continue;
+        if (significance && !(squares * length >= least_significance * least_significance * usual_length * pixels))
+            continue;
         for (const auto [begin, end] : parts.runs(i)) {
             const auto row = static_cast<std::size_t>(parts.row_of(begin));
             std::fill_n(kept + row * width + parts.col_of(begin), end - begin, std::uint8_t{1});

@@ -8,6 +8,20 @@
 #include "edges/strength.hpp"
 
 namespace rangeedge {
+namespace {
+
+// To where a surface may run on from one abscissa to another: by its curve, which far from its samples is uncertain, or
+// straight on.
+struct Extension {
+    double lower, upper;
+
+    Extension(const Curve& curve, double from, double to) {
+        const double curved = curve.value(to), straight = curve.value(from) + curve.slope(from) * (to - from);
+        lower = std::min(curved, straight), upper = std::max(curved, straight);
+    }
+};
+
+}  // namespace
 
 template <class T>
 ShadowStep step_across_shadow(const Line<T>& line, const Fit& f, const Fit& g, int before, int after, bool spaced) {
@@ -17,12 +31,13 @@ ShadowStep step_across_shadow(const Line<T>& line, const Fit& f, const Fit& g, i
     const Curve &near = (step.before_nearer ? f : g).curve, &far = (step.before_nearer ? g : f).curve;
     const double x_near = step.before_nearer ? x1 : x2, x_far = step.before_nearer ? x2 : x1;
     // The end of the nearer surface, above that of the farther one and above the place to which that runs on.
-    const double end = near.value(x_near), beyond = far.value(x_far), below = far.value(x_near);
+    const double end = near.value(x_near), beyond = far.value(x_far);
+    const double below = Extension(far, x_far, x_near).upper;
     if (line.frame->projective && !(std::min({end, beyond, below}) > 0)) return {};
     if (spaced && line.grazing_angle(before, after) > veil) return {};
     step.jump = std::min(line.depth(beyond), line.depth(below)) - line.depth(end);
     step.difference = end - std::max(beyond, below);
-    if (!spaced) step.difference = std::min(step.difference, near.value(x_far) - beyond);
+    if (!spaced) step.difference = std::min(step.difference, Extension(near, x_near, x_far).lower - beyond);
     const FitDeviation deviation =
         jump_deviation(value_deviation(line, before, f.samples, f.curve.value_variance(x_near)),
                        value_deviation(line, after, g.samples, g.curve.value_variance(x_near)));

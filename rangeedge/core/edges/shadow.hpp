@@ -3,8 +3,8 @@
 // reach.
 //
 // The two sides are one surface with a hole in it, or meet there, where the farther one runs on to the end of the
-// nearer one, or where a surface between the two ends could be seen, since it is not almost parallel to the line of
-// sight. The paper does not compare segments across pixels without data.
+// nearer one, along its curve or straight on, or where a surface between the two ends could be seen, since it is not
+// almost parallel to the line of sight. The paper does not compare segments across pixels without data.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "scanline/curve.hpp"

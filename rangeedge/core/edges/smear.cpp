@@ -67,8 +67,10 @@ SmearedStep smeared_step(const Line<T>& line, const Approximation& a, std::ptrdi
             at_last = share;
             started = started || share > own_share;
             if (!started) step.before = k;
-            if (share < 0.5) step.low = k, step.high = a.segments[next].first;
-            else step.high = std::min(step.high, k);
+            if (share < 0.5)
+                step.low = k, step.high = a.segments[next].first;
+            else
+                step.high = std::min(step.high, k);
             step.after = share < 1 - own_share ? a.segments[next].first : std::min(step.after, k);
         }
     for (int k = step.before + 1; k < step.after; ++k) smeared += line.ordinate(k) == line.ordinate(k);

@@ -73,8 +73,8 @@ struct FitNoise {
 };
 
 struct Noise {
-    Deviation single;            // sigma
-    Deviation waves;             // of fits to many samples
+    Deviation single;  // sigma
+    Deviation waves;   // of fits to many samples
     FitNoise rows, cols, diagonals;
     const float* map = nullptr;  // sigma at every pixel of the image, of lengths, or null
 
@@ -83,14 +83,17 @@ struct Noise {
     }
 
     double sigma(double ordinate, std::int64_t pixel, bool projective) const {
-        return at_least_finest(map ? mapped(ordinate, pixel, projective) : single.of_ordinate(std::abs(ordinate), projective));
+        return at_least_finest(map ? mapped(ordinate, pixel, projective)
+                                   : single.of_ordinate(std::abs(ordinate), projective));
     }
     double waves_at(double ordinate, std::int64_t pixel, bool projective) const {
-        return at_least_finest(map ? mapped(ordinate, pixel, projective) : waves.of_ordinate(std::abs(ordinate), projective));
+        return at_least_finest(map ? mapped(ordinate, pixel, projective)
+                                   : waves.of_ordinate(std::abs(ordinate), projective));
     }
     // The share w(n) of the waves in the noise of a fit to n samples.
     static double wave_share(int n) {
-        constexpr double shares[] = {0, 0, 0, 0.2, 0.4, 0.475, 0.55, 0.625, 0.7, 0.7375, 0.775, 0.8125, 0.85, 0.8875, 0.925, 0.9625, 1};
+        constexpr double shares[] = {0,      0,     0,      0.2,  0.4,    0.475, 0.55,   0.625, 0.7,
+                                     0.7375, 0.775, 0.8125, 0.85, 0.8875, 0.925, 0.9625, 1};
         return shares[std::max(0, std::min(n, 16))];
     }
     static constexpr double finest = 1e-30;  // no deviation is smaller, lest it be divided by

@@ -46,7 +46,7 @@ template <class T>
 NoiseEstimate estimate_noise(const T* ordinate, int rows, int cols, bool projective, double step, int threads) {
     Team team(std::min(threads, 2));  // for more there is too little to do
     const SingleNoise found = single_noise(ordinate, rows, cols, projective, team);
-    if (!(step > 0)) step = rounding_step(ordinate, rows, cols, projective);
+    if (projective && !(step > 0)) step = rounding_step(ordinate, rows, cols);
     const double rounding = step / std::sqrt(12.0);
     NoiseEstimate estimate;
     estimate.single = projective ? of_depths(found, rounding) : of_heights(found, rounding);

@@ -23,9 +23,9 @@ constexpr double smooth_growth = 5.66;    // the same of waves without an end, 2
 // Of factors on slopes, at the most, where single values are noisy: waves of eight times their deviation.
 constexpr double most_slope[FitFactors::levels] = {6, 14, 24, 36, 45};
 const double most_shared = std::sqrt(5.0);  // over factors of one line: five lines that err alike
-constexpr double value_per_slope = 0.5;   // of factors, at the least: a wrong slope makes the value at the end wrong
-constexpr double least_factor = 0.5;      // errors that cancel each other are not relied on
-constexpr double most_factor = 1e6;       // more is no noise, but the rounding of numbers that are hardly any
+constexpr double value_per_slope = 0.5;     // of factors, at the least: a wrong slope makes the value at the end wrong
+constexpr double least_factor = 0.5;        // errors that cancel each other are not relied on
+constexpr double most_factor = 1e6;         // more is no noise, but the rounding of numbers that are hardly any
 constexpr double median_magnitude = 0.67449;  // of a normal variable, where a median of deviations is looked for
 constexpr double residual_factor = 1.25;  // for what the curves of splitting, through three samples, are off themselves
 constexpr double most_residual = 12;      // times the factor on slopes of the shortest fits
@@ -109,7 +109,8 @@ void write_fit_noise(const DirectionSteps& found, Measure& measure, bool silent,
         if (!silent) *slope = std::min(*slope, most_slope[level]);
         *value = std::min(std::max(*value, value_per_slope * *slope), *slope);
         *shared_slope = std::max(std::min(*shared_slope, most_shared * *slope), *slope);
-        *shared_value = std::max({std::min(*shared_value, most_shared * *value), *value, value_per_slope * *shared_slope});
+        *shared_value =
+            std::max({std::min(*shared_value, most_shared * *value), *value, value_per_slope * *shared_slope});
     }
     const double residual =
         residual_factor * median_magnitude * measure.factors(found.residuals, longest_residuals).gap;

@@ -10,7 +10,7 @@
 namespace rangeedge {
 namespace {
 
-constexpr int looked_at = 44;              // rows, and columns, of which each pixel of both is looked at
+constexpr int looked_at = 32;              // rows, and columns, of which each pixel of both is looked at
 constexpr std::size_t fewest_levels = 16;  // that values take
 constexpr double coarsest = 0.01;          // of a distance: no step is larger
 constexpr int most_parts = 3;
@@ -25,10 +25,10 @@ int place(int i, int j, int size) {
     return own == i ? k : size - 1 - k;
 }
 
-// The step of which all lengths are multiples, apart from an offset, given nearly; 0 if they are not.
-double multiples_of(double step, const std::vector<double>& lengths) {
-    for (const double length : lengths) {  // the farther from the first, the better they tell the step
-        const double from_first = length - lengths.front(), steps = std::round(from_first / step);
+// The step of which all depths are multiples, apart from an offset, given nearly; 0 if they are not.
+double multiples_of(double step, const std::vector<double>& depths) {
+    for (const double depth : depths) {  // the farther from the first, the better they tell the step
+        const double from_first = depth - depths.front(), steps = std::round(from_first / step);
         if (std::abs(from_first - steps * step) > off_lattice * step) return 0;
         if (steps > 0) step = from_first / steps;
     }
@@ -38,37 +38,34 @@ double multiples_of(double step, const std::vector<double>& lengths) {
 }  // namespace
 
 template <class T>
-double rounding_step(const T* ordinate, int rows, int cols, bool projective) {
-    std::vector<double> lengths;
+double rounding_step(const T* inverse_depth, int rows, int cols) {
+    std::vector<double> depths;
     for (int i = 0; i < looked_at; ++i)
         for (int j = 0; j < looked_at; ++j) {
             const int v = place(i, j, rows), u = place(j, i, cols);
-            const auto y = static_cast<double>(ordinate[static_cast<std::ptrdiff_t>(v) * cols + u]);
-            const double length = projective ? 1 / y : y;
-            if (std::isfinite(length)) lengths.push_back(length);
+            const double depth = 1 / static_cast<double>(inverse_depth[static_cast<std::ptrdiff_t>(v) * cols + u]);
+            if (std::isfinite(depth)) depths.push_back(depth);
         }
-    if (lengths.size() < fewest_levels) return 0;
-    std::sort(lengths.begin(), lengths.end());
+    if (depths.size() < fewest_levels) return 0;
+    std::sort(depths.begin(), depths.end());
     // Apart from the rounding of their type, and of the inverse.
-    const double largest = std::max(std::abs(lengths.front()), std::abs(lengths.back()));
-    const double same = 4 * static_cast<double>(std::numeric_limits<T>::epsilon()) * largest;
+    const double same = 4 * static_cast<double>(std::numeric_limits<T>::epsilon()) * depths.back();
     double step = HUGE_VAL;
     std::size_t levels = 1;
-    for (std::size_t i = 1; i < lengths.size(); ++i) {
-        const double gap = lengths[i] - lengths[i - 1];
+    for (std::size_t i = 1; i < depths.size(); ++i) {
+        const double gap = depths[i] - depths[i - 1];
         if (!(gap > same)) continue;
         step = std::min(step, gap);
         ++levels;
     }
-    if (levels < fewest_levels || !(step > 4 * same) || (projective && step > coarsest * lengths[lengths.size() / 2]))
-        return 0;
+    if (levels < fewest_levels || !(step > 4 * same) || step > coarsest * depths[depths.size() / 2]) return 0;
     // Where no two values are next to each other, the step is a part of the least gap.
     for (int parts = 1; parts <= most_parts && step > parts * 4 * same; ++parts)
-        if (const double found = multiples_of(step / parts, lengths); found > 0) return found;
+        if (const double found = multiples_of(step / parts, depths); found > 0) return found;
     return 0;
 }
 
-template double rounding_step(const float*, int, int, bool);
-template double rounding_step(const double*, int, int, bool);
+template double rounding_step(const float*, int, int);
+template double rounding_step(const double*, int, int);
 
 }  // namespace rangeedge

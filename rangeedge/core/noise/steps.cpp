@@ -16,7 +16,7 @@ constexpr int most_groups = 12;  // of such neighbours, along rows, and along co
 constexpr int positions = 80;    // of windows on a scan line, at the most, and
 constexpr int least_step = 8;    // samples from one to the next, at the least
 constexpr int shortest_residuals = 16;
-constexpr double edge_step = 20;            // deviations by which a step is no noise
+constexpr double edge_step = 20;           // deviations by which a step is no noise
 constexpr std::size_t least_windows = 40;  // that tell a deviation
 
 // The places of windows of n samples in a line, the same ones whichever end it begins at.

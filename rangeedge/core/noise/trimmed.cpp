@@ -18,7 +18,9 @@ constexpr double kept_deviation = 0.607;       // of a normal variable of deviat
 constexpr double median_magnitude = 0.67449;   // of that variable
 constexpr double quarter_magnitude = 0.31864;  // the lower quartile of its magnitudes
 constexpr double tenth_magnitude = 0.12566;    // and their lowest tenth
-constexpr int dropped_bits = 20;               // of a float that its bucket does not tell: 8 buckets an octave are left
+constexpr double quarter_spread = 1.8;         // of that quartile of n values, as a part of it, times the root of n
+constexpr double tenth_spread = 3;
+constexpr int dropped_bits = 20;  // of a float that its bucket does not tell: 8 buckets an octave are left
 
 // The sum of the squares of values whose bits, as an integer, are below a limit.
 template <int bytes>
@@ -130,9 +132,12 @@ double median_deviation(const float* magnitudes, std::size_t count) {
 double normal_deviation(const float* magnitudes, std::size_t count) {
     if (count == 0) return 0;
     const Histogram histogram(magnitudes, count);
-    return std::min({static_cast<double>(histogram.value(count / 2)) / median_magnitude,
-                     static_cast<double>(histogram.value(count / 4)) / quarter_magnitude,
-                     static_cast<double>(histogram.value(count / 10)) / tenth_magnitude});
+    const double error = 2 / std::sqrt(static_cast<double>(count));
+    const auto by_rank = [&](std::size_t rank, double magnitude, double spread) {
+        return (1 + spread * error) * static_cast<double>(histogram.value(rank)) / magnitude;
+    };
+    return std::min({by_rank(count / 2, median_magnitude, 0), by_rank(count / 4, quarter_magnitude, quarter_spread),
+                     by_rank(count / 10, tenth_magnitude, tenth_spread)});
 }
 
 }  // namespace rangeedge

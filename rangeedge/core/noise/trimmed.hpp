@@ -21,8 +21,8 @@ double quartile_deviation(const float* magnitudes, std::size_t count);
 // The same by the median of the magnitudes.
 double median_deviation(const float* magnitudes, std::size_t count);
 
-// The largest deviation of normal values that agrees with the median, the quartile and the tenth of the magnitudes. Those
-// of noise agree; where half of the values are outliers, the smaller ones still tell the deviation of the rest.
+// The same by the median; by the quartile or the tenth where that is less by more than chance makes it. Those of noise
+// agree; where half of the values are outliers, the smaller ones still tell the deviation of the rest.
 double normal_deviation(const float* magnitudes, std::size_t count);
 
 }  // namespace rangeedge

@@ -96,7 +96,8 @@ void flying_pixels(const BoundFrame& bound, const ScanLineOptions& options, int 
 
 void bound_keep_lines(const Image<std::uint8_t>& edges, int min_length, const Image<float>& significance,
                       double least_significance, const OutImage<std::uint8_t>& kept) {
-    keep_lines(edges.data(), rows(edges), cols(edges), min_length, significance.data(), least_significance, kept.data());
+    keep_lines(edges.data(), rows(edges), cols(edges), min_length, significance.data(), least_significance,
+               kept.data());
 }
 
 void thin_to_lines(const Image<std::uint8_t>& edges, const Image<std::uint8_t>& preferred, int spur_length,
@@ -124,8 +125,8 @@ void bind_edges(nb::module_& m) {
     m.def("flying_pixels", &flying_pixels, "frame"_a, "options"_a, "threads"_a, array("flying"), Unlocked());
     m.def("thin_lines", &thin_to_lines, array("edges"), optional_array("preferred"), "spur_length"_a, array("thin"),
           Unlocked());
-    m.def("keep_lines", &bound_keep_lines, array("edges"), "min_length"_a, optional_array("significance"), "least_significance"_a,
-          array("kept"), Unlocked());
+    m.def("keep_lines", &bound_keep_lines, array("edges"), "min_length"_a, optional_array("significance"),
+          "least_significance"_a, array("kept"), Unlocked());
 }
 
 }  // namespace rangeedge::python

@@ -16,8 +16,7 @@ using FitsArray = std::array<double, 4 + 2 * FitNoise::size>;
 
 // They keep the arrays alive to which their kernels' side points.
 struct BoundNoise {
-    BoundNoise(double a, double b, double c, const FitsArray& fits, Image<float> deviations)
-        : map(deviations) {
+    BoundNoise(double a, double b, double c, const FitsArray& fits, Image<float> deviations) : map(deviations) {
         noise.single = {a, b, c, 0};
         noise.waves = {fits[0], fits[1], fits[2], fits[3]};
         noise.rows = FitNoise(&fits[4]);

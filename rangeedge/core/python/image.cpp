@@ -27,7 +27,8 @@ void bind_estimate(nb::module_& m) {
     m.def(
         "estimate_noise",
         [](const Image<T>& ordinate, bool projective, double step, int threads) {
-            const NoiseEstimate e = estimate_noise(ordinate.data(), rows(ordinate), cols(ordinate), projective, step, threads);
+            const NoiseEstimate e =
+                estimate_noise(ordinate.data(), rows(ordinate), cols(ordinate), projective, step, threads);
             std::array<double, 4 + FitsArray().size()> numbers;
             auto next = numbers.begin();
             for (const Deviation& d : {e.single, e.fits.waves}) next = std::copy_n(&d.c0, 4, next);
@@ -46,8 +47,8 @@ using FrameInit = nb::init<nb::ndarray<const T, nb::c_contig, nb::device::cpu>, 
 
 void bind_image(nb::module_& m) {
     nb::class_<BoundNoise>(m, "Noise", "Standard deviation a + b z + c z^2 of a length z, or that of every pixel.")
-        .def(nb::init<double, double, double, const FitsArray&, Image<float>>(), "a"_a,
-             "b"_a, "c"_a, "fits"_a, optional_array("map") = nb::none());
+        .def(nb::init<double, double, double, const FitsArray&, Image<float>>(), "a"_a, "b"_a, "c"_a, "fits"_a,
+             optional_array("map") = nb::none());
     nb::class_<BoundFrame>(m, "Frame", "A range image: ordinates (H, W) or points (H, W, 3), NaN without data.")
         .def(FrameInit<float>(), array("samples"), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a)
         .def(FrameInit<double>(), array("samples"), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a);

@@ -96,8 +96,8 @@ typename Merger<T, List>::Sides Merger<T, List>::sides_without(int i, const Arra
     if (sides.cut >= s.first) sides.left = sides.left + List::sums_over(line, {s.first, sides.cut});
     if (sides.cut < s.last) sides.right = List::sums_over(line, {sides.cut + 1, s.last}) + sides.right;
     const double deviation = list_.noise().join[s.size()] * line.noise_of(s).of_fit(s.size());
-    const double joint = residual_squares(sides.left, least_of(i, sides.left)) +
-                         residual_squares(sides.right, least_of(i, sides.right));
+    const double joint =
+        residual_squares(sides.left, least_of(i, sides.left)) + residual_squares(sides.right, least_of(i, sides.right));
     const double rise = joint - (residual(before) + residual(i) + residual(after));
     const double cost = rise / (deviation * deviation);
     if (cost < bridge_factor * bridge_factor * limit_) sides.cost = cost;

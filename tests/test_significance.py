@@ -1,0 +1,156 @@
+"""What the noise of fits does to splitting, to curves and to significance, and which strengths count."""
+
+import numpy as np
+import pytest
+from scenes import K, seen, surfaces
+
+from rangeedge import (
+    CREASE_MAX,
+    DIR_ROWS,
+    EdgeStrength,
+    NoiseModel,
+    detectEdges,
+    edgePoints,
+    edgeStrength,
+    selectEdges,
+)
+
+NAN = np.nan
+LEVELS = 5  # numbers of samples for which factors are given
+RAW = dict(minSignificance=0.0, maxShift=0.0, crease=CREASE_MAX)  # every candidate by itself
+
+
+def fits(sigma, waves=1.0, slope=1.0, value=1.0, shared_slope=1.0, shared_value=1.0, residual=1.0):
+    """A model of this deviation, waves in units of it, with the same factors for every number of samples."""
+    one = [f for f in (slope, value, shared_slope, shared_value) for _ in range(LEVELS)] + [residual]
+    return NoiseModel(sigma, fits=(waves * sigma, 0.0, 0.0, 0.0, *one, *one))
+
+
+GEOMETRIES = {"grid": (lambda z: z, dict(pixelSize=0.02)), "camera": (lambda z: z, dict(K=K)), "points": (seen, {})}
+
+
+# Significance.
+
+
+U = np.arange(60)
+EDGES = {  # and the factor by which each counts
+    "jump": (np.where(U < 30, 1.25, 1.0), "shared_value"),
+    "jump beside shadow": (np.where((U > 15) & (U < 35), NAN, np.where(U < 30, 1.25, 1.0)), "shared_value"),
+    "crease": (1 + 0.03 * np.abs(U - 29.6), "shared_slope"),
+}
+
+
+@pytest.mark.parametrize("edge", EDGES)
+def test_significance_is_in_deviations_of_what_neighbours_tell_together(edge):
+    profile, own = EDGES[edge]
+    z = profile * np.ones((30, 1))
+
+    def of(**factors):
+        points = edgePoints(z, noise=fits(0.003, **factors), directions=DIR_ROWS, **RAW)
+        assert len(points) == 30
+        return points["significance"]
+
+    (other,) = {"shared_value", "shared_slope"} - {own}
+    np.testing.assert_allclose(of(**{own: 2.5}) * 2.5, of(), rtol=1e-5)
+    np.testing.assert_allclose(of(**{other: 2.5}), of(), rtol=1e-5)
+
+
+def test_lines_stay_that_are_significant_somewhere():
+    crease, significance = np.zeros((2, 9, 30), np.float32)
+    crease[2:4, 3:27] = crease[6:8, 3:27] = 60
+    significance[crease > 0] = 8
+    significance[3, 20] = 15
+    strength = EdgeStrength(np.zeros_like(crease), crease, np.zeros(crease.shape, np.uint8), significance)
+    edges = selectEdges(strength) > 0
+    assert edges[2:4, 3:27].all()
+    assert not edges[6:8].any()
+    assert np.array_equal(selectEdges(strength, lineSignificance=0) > 0, crease > 0)
+    assert not selectEdges(strength, lineSignificance=15.1).any()
+
+
+def test_the_detector_leaves_lines_out_that_are_nowhere_significant():
+    # A roof so flat that its candidates are, together with their neighbours, just significant.
+    z = 1 + 0.0012 * np.abs(np.arange(60) - 29.6) * np.ones((50, 1))
+    z = z + np.random.default_rng(0).normal(0, 0.004, z.shape)
+    options = dict(noise=0.004, pixelSize=0.0005, creaseThreshold=60.0)
+    strength = edgeStrength(z, noise=0.004, pixelSize=0.0005)
+    peak = strength.significance[selectEdges(strength, creaseThreshold=60.0, lineSignificance=0) > 0].max()
+    assert detectEdges(z, lineSignificance=peak * 0.99, **options).any()
+    assert not detectEdges(z, lineSignificance=peak * 1.01, **options).any()
+
+
+# Splitting.
+
+
+@pytest.mark.parametrize("geometry", GEOMETRIES)
+def test_lines_are_split_where_they_exceed_the_waves(geometry):
+    form, options = GEOMETRIES[geometry]
+    src = form(surfaces(np.random.default_rng(2), (40, 50)))
+    model = fits(0.001, waves=3.0, residual=1.5)
+    options = dict(options, epsFactor=2.0, mergeSignificance=0.0, **RAW)
+
+    def cuts(**tolerance):
+        points = edgePoints(src, noise=model, **{**options, **tolerance})
+        return set(zip(points["x"].tolist(), points["y"].tolist(), points["direction"].tolist(), strict=True))
+
+    assert cuts() == cuts(eps=2.0 * 1.5 * 3.0 * 0.001)
+    assert len(cuts(eps=2.0 * 1.5 * 0.001)) > 1.2 * len(cuts()) > 0
+
+
+# Curves.
+
+
+@pytest.mark.parametrize("factor", [1.0, 3.0])
+@pytest.mark.parametrize(("significance", "curved"), [(4.0, False), (5.8, False), (6.2, True), (12.0, True)])
+def test_a_quadratic_term_needs_six_deviations(significance, curved, factor):
+    """The jump from a straight line to an arc tells whether that was taken for one."""
+    n, sigma = 40, 0.001
+    t = np.arange(n) - (n - 1) / 2
+    p = t**2 - np.mean(t**2)  # orthogonal to straight lines
+    c = significance * factor * sigma / np.sqrt(p @ p)
+    height = np.concatenate([np.zeros(n), 1 + c * p])
+    points = edgePoints(
+        height * np.ones((3, 1)), noise=fits(sigma, slope=factor, shared_slope=factor), heightMap=True,
+        directions=DIR_ROWS, **RAW,
+    )  # fmt: skip
+    assert len(points) == 3
+    # A straight line at its mean, or as much as the depths of the samples there allow.
+    np.testing.assert_allclose(points["jump"], 1 + c * p[0] if curved else 1, atol=0.01 * c * p[0], rtol=0)
+
+
+def bent(n, slope=0.5):
+    """A roof whose change of slope is spread evenly over n pixels."""
+    t = np.abs(np.arange(100) - 49.7)
+    return 100 - slope * np.where(t > n / 2, t, t**2 / max(n, 1) + n / 4) * np.ones((30, 1))
+
+
+@pytest.mark.parametrize("n", range(1, 4))
+def test_a_bend_within_a_few_pixels_is_a_crease(n):
+    points = edgePoints(bent(n), noise=1e-3, directions=DIR_ROWS, crease=CREASE_MAX)
+    assert points["crease"].max() > 5
+
+
+@pytest.mark.parametrize("n", range(10, 25))
+def test_a_bend_over_many_pixels_is_no_crease(n):
+    for eps in (None, 0.05, 0.3):
+        points = edgePoints(bent(n), noise=1e-3, eps=eps, mergeSignificance=0.0, directions=DIR_ROWS, crease=CREASE_MAX)
+        assert points["crease"].max(initial=0) <= 45 / 8 * 1.3
+
+
+# The noise of one place.
+
+
+@pytest.mark.parametrize("options", [dict(pixelSize=0.02), dict(K=[[30.0, 0, 24.5], [0, 28, 19.5], [0, 0, 1]])])
+def test_the_noise_at_a_border_is_that_of_both_sides(options):
+    """Where it changes from pixel to pixel, no side is preferred: a mirrored image has mirrored edges."""
+    found = 0
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        z = surfaces(rng, (40, 50))
+        noise = (0.003 * rng.uniform(0.4, 2.5, z.shape)).astype(np.float32)
+        before = edgeStrength(z, noise=noise, **options)
+        after = edgeStrength(z[:, ::-1], noise=noise[:, ::-1], **options)
+        assert np.array_equal(before.kind[:, ::-1], after.kind)
+        np.testing.assert_allclose(before.significance[:, ::-1], after.significance, rtol=1e-3)
+        found += np.count_nonzero(before.kind)
+    assert found > 1000
