@@ -91,7 +91,7 @@ def closeContours(
         min_area=closing.minArea,
     )
     regions = np.empty(frame.shape, np.int32)
-    _core.verified_regions(surface_map(frame, edges), kernel_options, regions)
+    _core.verified_regions(surface_map(frame, edges), kernel_options, frame.threads, regions)
     closed = ((edges != 0) | _meetings(regions)).view(np.uint8) * np.uint8(255)
     return deliver("dst", closed, dst)
 

@@ -18,6 +18,11 @@ _THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thr
 SRC = "a depth image of shape (H, W), or points of shape (H, W, 3) or (H, W, 4)"
 
 
+def threads_worth(pixels: int) -> int:
+    """How many threads an image of so many pixels is worth."""
+    return cv2.getNumThreads() if pixels >= _THREAD_PIXELS else 1
+
+
 @dataclass(frozen=True)
 class Frame:
     """A range image as the kernels take it: invalid pixels are NaN, ordinates grow toward the viewer.
@@ -45,7 +50,7 @@ class Frame:
     @property
     def threads(self) -> int:
         """How many threads the image is worth."""
-        return cv2.getNumThreads() if self.shape[0] * self.shape[1] >= _THREAD_PIXELS else 1
+        return threads_worth(self.shape[0] * self.shape[1])
 
     @cached_property
     def ordinate(self) -> np.ndarray:

@@ -40,18 +40,19 @@ def growRegions(
 
     1. *Surfaces*: each marker gets a plane by least squares; a quadratic where the plane fails; two planes that meet
        in a crease where those are better than the quadratic, as behind a gap in an edge.
-    2. *Growing*: all surfaces compete for the free pixels around them, the smallest residual first, up to `tolerance`
-       standard deviations, and not into edges. They are fitted anew while they grow. A quadratic that has turned
-       around a crease is cut in two.
-    3. *Merging*: patches that one surface describes as well as their own join; so do patches that meet along a border
-       mostly without edges under less than `smoothAngle`, or three times that where one of them is curved. What is
-       small beside its neighbour joins one, and never links two.
+    2. *Growing*: surfaces compete for the free pixels around them, up to `tolerance` standard deviations, and not into
+       edges: for tiles of 8 x 8 and 4 x 4 pixels without an edge first, the smallest misfit first, then pixel by pixel.
+       They are fitted anew while they grow. A quadratic that has turned around a crease is cut in two.
+    3. *Merging*: patches that one surface describes as well as their own join; so do patches that meet along most of
+       their border under less than `smoothAngle`, or three times that where one of them is curved. What is small beside
+       its neighbour joins one, and never links two, unless it lies between them like the bend of a strip.
     4. *Borders*: edge pixels, and others that are left, go to the neighbouring surface they fit best, up to twice the
        tolerance. Strips along rounded edges and regions below `minArea` fall to their neighbours.
 
     Residuals are perpendicular to nothing but the image: of inverse depth for a camera, of height on a grid, where
-    planes are planes. Their standard deviation is that of the noise, scaled to the typical misfit of the markers, since
-    the noise of many sensors is correlated between pixels; on slopes that of the pixel's place comes on top.
+    planes are planes. Their standard deviation is that of the noise, scaled by up to 8 to how much tiles of pixels err
+    together and to the typical misfit of the markers, since the noise of many sensors is correlated between pixels; on
+    slopes that of the pixel's place comes on top. Labels do not depend on the number of threads.
 
     Parameters
     ----------
@@ -64,7 +65,8 @@ def growRegions(
     mask : ndarray of shape (H, W), 8-bit or bool, optional
         Non-zero where pixels are used.
     newSeeds : bool
-        Whether areas that no marker reaches grow regions of their own.
+        Whether areas that no marker reaches grow regions of their own; among edges too dense to be any, where one
+        surface fits all of such an area.
     {options}
 
     Returns
@@ -269,7 +271,7 @@ def _grow(frame: Frame, markers: np.ndarray, edges: np.ndarray | None, growing: 
         new_seeds=new_seeds,
     )
     labels = np.empty(frame.shape, np.int32)
-    _core.grow_regions(surface_map(frame, edges), markers, options, labels)
+    _core.grow_regions(surface_map(frame, edges), markers, options, frame.threads, labels)
     return labels
 
 

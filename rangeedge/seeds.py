@@ -10,6 +10,7 @@ import numpy as np
 from . import _core
 from ._check import array, error, fail, image8, image32f
 from ._option import takes
+from .frame import threads_worth
 from .options import SEEDING, Seeding
 
 if TYPE_CHECKING:
@@ -115,19 +116,9 @@ def extractSeedsWithStats(
 
 def label_statistics(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Bounding box and area, and centroid, of every label 0 .. count - 1, as `cv2.connectedComponentsWithStats`."""
-    flat = labels.ravel()
-    area = np.bincount(flat, minlength=count)
-    first, last = (np.empty((count, 2), np.int32) for _ in range(2))
-    centroids = np.empty((count, 2))
-    for axis, coordinate in enumerate(np.indices(labels.shape, np.int32)[::-1]):
-        coordinate = coordinate.ravel()
-        first[:, axis], last[:, axis] = np.iinfo(np.int32).max, -1
-        np.minimum.at(first[:, axis], flat, coordinate)
-        np.maximum.at(last[:, axis], flat, coordinate)
-        with np.errstate(invalid="ignore"):
-            centroids[:, axis] = np.bincount(flat, weights=coordinate, minlength=count) / area
-    first[area == 0], last[area == 0] = 0, -1
-    return np.column_stack([first, last - first + 1, area]).astype(np.int32), centroids
+    boxes, centroids = np.empty((count, 5), np.int32), np.empty((count, 2))
+    _core.label_statistics(labels, threads_worth(labels.size), boxes, centroids)
+    return boxes, centroids
 
 
 def find_seeds(distance: np.ndarray, seeding: Seeding, mask: np.ndarray | None) -> tuple[int, np.ndarray]:
@@ -139,4 +130,5 @@ def find_seeds(distance: np.ndarray, seeding: Seeding, mask: np.ndarray | None) 
         raise fail("distance", ">= 0 everywhere", f"a least value of {distance.min():g}")
     mask = None if mask is None else image8("mask", mask, distance.shape)
     markers = np.empty(distance.shape, np.int32)
-    return _core.extract_seeds(distance, mask, seeding.minDistance, seeding.separation, markers) + 1, markers
+    threads = threads_worth(distance.size)
+    return _core.extract_seeds(distance, mask, seeding.minDistance, seeding.separation, threads, markers) + 1, markers

@@ -8,8 +8,11 @@ from . import _core
 from .frame import Frame
 
 SURFACE = np.dtype([("curved", np.bool_), ("centroid", "3f8"), ("normal", "3f8"), ("quadric", "10f8"), ("rms", "f8")])
-_CURVED_GAIN = 0.8  # a quadratic must lower the rms of a plane to this share
-_QUADRIC_POINTS = 40  # fewer tell no curvature
+_LEAST_GRADIENT = 0.01  # of a quadric, of its typical one, where a distance is F / |grad F|
+# Exponents of x, y, z: those of the moments that the core adds up, and those of a quadric's terms.
+_EXPONENTS = [(i, j, n - i - j) for n in range(5) for i in range(n, -1, -1) for j in range(n - i, -1, -1)]
+_TERMS = [(2, 0, 0), (0, 2, 0), (0, 0, 2), (1, 1, 0), (1, 0, 1), (0, 1, 1), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+_PLACE = {e: n for n, e in enumerate(_EXPONENTS)}
 
 
 def surface_map(frame: Frame, edges: np.ndarray | None) -> _core.RangeMap:
@@ -17,8 +20,10 @@ def surface_map(frame: Frame, edges: np.ndarray | None) -> _core.RangeMap:
     x, y, to_plane = _places(frame)
     seen = frame.ordinate[frame.valid.view(bool)]
     offset = float(seen[:: max(1, len(seen) // 4096)].mean(dtype=np.float64)) if len(seen) else 0.0
-    ordinate = (frame.ordinate - frame.ordinate.dtype.type(offset)).astype(np.float32, copy=False)
-    return _core.RangeMap(frame.kernel, x, y, ordinate, offset, to_plane, edges)
+    with np.errstate(invalid="ignore", over="ignore"):  # signalling NaN; beyond single precision
+        ordinate = (frame.ordinate - frame.ordinate.dtype.type(offset)).astype(np.float32, copy=False)
+    rounding = float(np.spacing(np.abs(frame.ordinate.dtype.type(offset))))
+    return _core.RangeMap(frame.kernel, x, y, ordinate, offset, rounding, to_plane, edges)
 
 
 def _places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[float, ...]]:
@@ -46,93 +51,78 @@ def _places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[f
 def surfaces_of(frame: Frame, labels: np.ndarray, count: int) -> np.ndarray:
     """The plane, or the quadric where a plane fails, of every label 1 .. count - 1."""
     surfaces = np.zeros(count, SURFACE)
-    points = frame.points.reshape(-1, 3)
-    toward = frame.toward_viewer
-    order = np.argsort(labels, axis=None, kind="stable")
-    starts = np.searchsorted(labels.ravel()[order], np.arange(count + 1))
-    for label in range(1, count):
-        inside = order[starts[label] : starts[label + 1]]
-        _describe(surfaces[label], points[inside], frame.ordinate.ravel()[inside], inside, labels.shape[1], toward)
+    points = frame.points
+    origins, scales = np.zeros((count, 3)), np.ones(count)
+    moments, curved = np.zeros((count, len(_EXPONENTS))), np.zeros(count, np.uint8)
+    ordinate = frame.ordinate.astype(np.float64, copy=False)
+    _core.region_moments(labels, points, ordinate, frame.threads, origins, scales, moments, curved)
+    # Planes and quadrics in (p - origin) / scale, as coefficients of _TERMS and 1, with a gradient of about 1.
+    mean, normal, rms = _planes(moments)
+    quadrics = np.concatenate([np.zeros((count, 6)), normal, -(normal * mean).sum(axis=1, keepdims=True)], axis=1)
+    curved = curved.view(bool)
+    quadrics[curved] = _taubin(moments[curved])
+    misfits = np.zeros(count)
+    floors = np.where(curved, _LEAST_GRADIENT, 0.0)
+    _core.quadric_misfits(labels, points, frame.threads, origins, scales, quadrics, floors, misfits)
+    normal = np.where(curved[:, None], _gradients(quadrics, mean), normal)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+        centroid = origins + scales[:, None] * mean
+        away = -centroid if (toward := frame.toward_viewer) is None else toward
+        sign = np.where((normal * away).sum(axis=1) < 0, -1.0, 1.0)[:, None]
+        for name, values in (
+            ("curved", curved),
+            ("centroid", centroid),
+            ("normal", sign * normal),
+            ("quadric", sign * _in_lengths(quadrics, origins, scales)),
+            ("rms", scales * np.where(curved, misfits, rms)),
+        ):
+            surfaces[name][1:] = values[1:]
     return surfaces
 
 
-def _describe(
-    surface: np.void,
-    points: np.ndarray,
-    ordinate: np.ndarray,
-    pixels: np.ndarray,
-    width: int,
-    toward: np.ndarray | None,
-) -> None:
-    centroid = points.mean(axis=0)
-    values, vectors = np.linalg.eigh(np.cov((points - centroid).T, bias=True) if len(points) > 1 else np.eye(3))
-    normal, rms = vectors[:, 0], np.sqrt(max(values[0], 0.0))
-    quadric = np.concatenate([np.zeros(6), normal, [-normal @ centroid]])
-    curved = len(points) >= _QUADRIC_POINTS and _is_curved(ordinate, pixels, width)
-    if curved:
-        quadric, rms = _taubin(points, centroid)
-        normal = _gradient(quadric, centroid[None])[0]
-        normal /= np.linalg.norm(normal) or 1.0
-    if normal @ (-centroid if toward is None else toward) < 0:
-        normal, quadric = -normal, -quadric
-    surface["curved"], surface["centroid"], surface["normal"] = curved, centroid, normal
-    surface["quadric"], surface["rms"] = quadric, rms
+def _planes(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean points, normals of the planes through them, and root mean square distances from these."""
+    mean = moments[:, [_PLACE[e] for e in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]]
+    second = [[_PLACE[tuple(a + b)] for b in np.eye(3, dtype=int)] for a in np.eye(3, dtype=int)]
+    values, vectors = np.linalg.eigh(moments[:, second] - mean[:, :, None] * mean[:, None, :])
+    return mean, vectors[:, :, 0], np.sqrt(np.maximum(values[:, 0], 0.0))
 
 
-def _is_curved(ordinate: np.ndarray, pixels: np.ndarray, width: int) -> bool:
-    """Whether a quadratic over the image describes the ordinates much better than a plane."""
-    x, y = (pixels % width).astype(np.float64), (pixels // width).astype(np.float64)
-    x, y = (x - x.mean()) / max(np.ptp(x), 1), (y - y.mean()) / max(np.ptp(y), 1)
-    values = ordinate.astype(np.float64) - ordinate.mean(dtype=np.float64)
-    columns = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
-    rms = [_misfit(columns[:, :terms], values) for terms in (3, 6)]
-    return rms[0] > 1e-6 * np.ptp(values) and rms[1] < _CURVED_GAIN * rms[0]
+def _taubin(moments: np.ndarray) -> np.ndarray:
+    """The quadrics F with the least mean of F^2 over that of |grad F|^2, which is 1."""
+    mean = moments[:, [_PLACE[e] for e in _TERMS]]
+    scatter = moments[:, [[_PLACE[_sum(a, b)] for b in _TERMS] for a in _TERMS]] - mean[:, :, None] * mean[:, None, :]
+    slope = np.zeros_like(scatter)
+    for a, b, axis in np.ndindex(len(_TERMS), len(_TERMS), 3):
+        factor = _TERMS[a][axis] * _TERMS[b][axis]
+        if factor:
+            both = _sum(_TERMS[a], _TERMS[b])
+            slope[:, a, b] += factor * moments[:, _PLACE[tuple(n - 2 * (k == axis) for k, n in enumerate(both))]]
+    ridge = 1e-12 * np.trace(slope, axis1=1, axis2=2)[:, None, None] * np.eye(len(_TERMS))
+    root = np.linalg.inv(np.linalg.cholesky(slope + ridge))
+    least = np.linalg.eigh(root @ scatter @ root.swapaxes(1, 2))[1][:, :, :1]
+    vector = (root.swapaxes(1, 2) @ least)[:, :, 0]
+    vector /= np.sqrt(np.einsum("na,nab,nb->n", vector, slope, vector))[:, None]
+    return np.concatenate([vector, -(vector * mean).sum(axis=1, keepdims=True)], axis=1)
 
 
-def _misfit(columns: np.ndarray, values: np.ndarray) -> float:
-    solution = np.linalg.lstsq(columns, values, rcond=None)[0]
-    return float(np.sqrt(np.mean((values - columns @ solution) ** 2)))
+def _sum(a: tuple[int, ...], b: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(i + j for i, j in zip(a, b, strict=True))
 
 
-def _monomials(p: np.ndarray) -> np.ndarray:
+def _gradients(quadrics: np.ndarray, p: np.ndarray) -> np.ndarray:
+    a, b, c, d, e, f = quadrics.T[:6]
     x, y, z = p.T
-    return np.stack([x * x, y * y, z * z, x * y, x * z, y * z, x, y, z], axis=1)
+    curvature = np.stack([2 * a * x + d * y + e * z, d * x + 2 * b * y + f * z, e * x + f * y + 2 * c * z], axis=1)
+    return curvature + quadrics[:, 6:9]
 
 
-def _gradient(quadric: np.ndarray, p: np.ndarray) -> np.ndarray:
-    a, b, c, d, e, f, g, h, i, _ = quadric
-    return p @ np.array([[2 * a, d, e], [d, 2 * b, f], [e, f, 2 * c]]) + np.array([g, h, i])
-
-
-def _taubin(points: np.ndarray, centroid: np.ndarray) -> tuple[np.ndarray, float]:
-    """The quadric with the least sum of F^2 over that of |grad F|^2, and the rms of F / |grad F|."""
-    scale = float(np.sqrt(np.mean((points - centroid) ** 2))) or 1.0
-    p = (points - centroid) / scale
-    columns = _monomials(p)
-    mean = columns.mean(axis=0)
-    scatter = (columns - mean).T @ (columns - mean)
-    x, y, z = p.T
-    o, one = np.zeros_like(x), np.ones_like(x)
-    gradients = (
-        np.stack([2 * x, o, o, y, z, o, one, o, o], axis=1),
-        np.stack([o, 2 * y, o, x, o, z, o, one, o], axis=1),
-        np.stack([o, o, 2 * z, o, x, y, o, o, one], axis=1),
-    )
-    slope = sum(g.T @ g for g in gradients)
-    root = np.linalg.inv(np.linalg.cholesky(slope + 1e-12 * np.trace(slope) * np.eye(9)))
-    vector = root.T @ np.linalg.eigh(root @ scatter @ root.T)[1][:, 0]
-    quadric = np.append(vector, -vector @ mean)
-    length = np.linalg.norm(_gradient(quadric, p), axis=1)
-    typical = float(np.sqrt(np.mean(length**2))) or 1.0
-    value = columns @ quadric[:9] + quadric[9]
-    rms = scale * float(np.sqrt(np.mean((value / np.maximum(length, 0.01 * typical)) ** 2)))
-    return _uncentred(quadric * (scale / typical), centroid, scale), rms
-
-
-def _uncentred(quadric: np.ndarray, centroid: np.ndarray, scale: float) -> np.ndarray:
-    """The same quadric in p, given in (p - centroid) / scale."""
-    a, b, c, d, e, f = quadric[:6] / scale**2
-    second = np.array([[a, d / 2, e / 2], [d / 2, b, f / 2], [e / 2, f / 2, c]])
-    first = quadric[6:9] / scale
-    constant = quadric[9] - first @ centroid + centroid @ second @ centroid
-    return np.concatenate([[a, b, c, d, e, f], first - 2 * second @ centroid, [constant]])
+def _in_lengths(quadrics: np.ndarray, origins: np.ndarray, scales: np.ndarray) -> np.ndarray:
+    """scale F((p - origin) / scale) in powers of p."""
+    a, b, c, d, e, f = quadrics.T[:6] / scales
+    second = np.stack([a, d / 2, e / 2, d / 2, b, f / 2, e / 2, f / 2, c], axis=1).reshape(-1, 3, 3)
+    bent = np.einsum("nij,nj->ni", second, origins)
+    first = quadrics[:, 6:9] - 2 * bent
+    constant = scales * quadrics[:, 9] - ((quadrics[:, 6:9] - bent) * origins).sum(axis=1)
+    return np.concatenate([np.stack([a, b, c, d, e, f], axis=1), first, constant[:, None]], axis=1)

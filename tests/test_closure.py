@@ -41,7 +41,7 @@ def is_surface(src, inside, sigma=0.1, tolerance=3.0, share=0.9):
     regions = np.zeros(inside.shape, np.int32)
     options = _core.ClosureOptions(correlation=1.0, tolerance=tolerance, share=share, dilations=0, min_area=1)
     frame = measured_frame(src, ScanLineParams(noise=sigma))
-    _core.verified_regions(surface_map(frame, (~inside).view(np.uint8)), options, regions)
+    _core.verified_regions(surface_map(frame, (~inside).view(np.uint8)), options, 1, regions)
     assert not regions.any() or np.array_equal(regions, inside.astype(np.int32))
     return bool(regions.any())
 

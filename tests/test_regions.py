@@ -6,8 +6,11 @@ import pytest
 
 import rangeedge
 from rangeedge.evaluation import hooverScores
+from rangeedge.frame import read_frame
 from rangeedge.noise import NoiseModel
+from rangeedge.options import ScanLineParams
 from rangeedge.regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
+from rangeedge.seeds import find_seeds
 from rangeedge.synthetic import (
     abwCamera,
     abwNoise,
@@ -119,6 +122,32 @@ class TestGrowing:
         markers = markers_at(STEP.shape, (slice(30, 50), slice(10, 30)))
         one_region_each(growRegions(STEP, markers, noise=SIGMA, newSeeds=True), np.s_[:, :50], np.s_[:, 50:])
 
+    def test_edges_too_dense_to_be_any(self):
+        # A face of which half the pixels are edges, as of a surface seen at a grazing angle.
+        edges = np.zeros(STEP.shape, np.uint8)
+        edges[:, 50:] = np.random.default_rng(1).random((80, 70)) < 0.5
+        markers = markers_at(STEP.shape, (slice(30, 50), slice(10, 30)))
+        labels = growRegions(STEP, markers, edges=edges, noise=SIGMA, newSeeds=True)
+        one_region_each(labels, np.s_[:, :50], np.s_[:, 50:])
+        assert not growRegions(STEP, markers, edges=edges, noise=SIGMA)[:, 50:].any()
+
+    def test_edges_on_a_smooth_surface_do_not_part_it(self):
+        src = noisy(columns(0.2 * X))
+        edges = np.zeros(src.shape, np.uint8)
+        edges[:, 60] = 255
+        markers = markers_at(src.shape, (slice(30, 50), slice(10, 30)), (slice(30, 50), slice(90, 110)))
+        assert (growRegions(src, markers, edges=edges, noise=SIGMA) == 1).all()
+
+    @pytest.mark.parametrize("seed", range(3))
+    def test_noise_with_long_waves(self, seed):
+        # Neighbours err together over some 10 pixels, by 5 times what each errs by itself; markers are no larger.
+        rng = np.random.default_rng(seed)
+        waves = cv2.GaussianBlur(rng.normal(size=(160, 240)), (0, 0), 5)
+        src = columns(0.1 * np.arange(240), 160) + 5 * SIGMA * waves / waves.std() + rng.normal(0, SIGMA, waves.shape)
+        rows, cols = np.indices(src.shape)
+        markers = np.where((rows % 20 < 10) & (cols % 20 < 10), 1 + rows // 20 * 12 + cols // 20, 0).astype(np.int32)
+        assert (growRegions(src, markers, noise=SIGMA, newSeeds=True) == 1).mean() > 0.99
+
     def test_no_markers(self):
         assert not growRegions(STEP, np.zeros(STEP.shape, np.int32)).any()
 
@@ -180,6 +209,22 @@ class TestSegmentation:
             cv2.setNumThreads(threads)
         assert all(np.array_equal(results[0], r) for r in results)
 
+    @pytest.mark.parametrize("scene", [polyhedraScene, curvedScene])
+    def test_threads_share_large_images(self, scene):
+        camera = kinectCamera()
+        scan = kinectNoise(renderScene(scene(5, camera), camera), seed=5)
+        threads = cv2.getNumThreads()
+        try:
+            results = []
+            for n in (1, 2, 5):
+                cv2.setNumThreads(n)
+                results.append(segmentRegionsWithStats(scan.src, **scan.geometry))
+        finally:
+            cv2.setNumThreads(threads)
+        for result in results[1:]:
+            for found, expected in zip(result, results[0], strict=True):
+                assert np.array_equal(found, expected)
+
     def test_integers_as_floats(self):
         pair = planePair((0.5, 0, -1), (-0.5, 0, -1), point=(0, 0, 1))
         millimetres = kinectNoise(renderScene(pair, CAMERA), seed=1, holes=0).src
@@ -230,6 +275,53 @@ class TestSegmentation:
         for labels in (segmentRegions(depth.src, **depth.geometry), segmentRegions(points.astype(np.float32))):
             assert hooverScores(labels, truth).correct == truth.max() == labels.max()
 
+    @pytest.mark.parametrize("offset", [1e4, 5e5, 5e6])
+    def test_large_offsets_of_doubles(self, offset):
+        # As in UTM coordinates: the offset costs no resolution.
+        height = columns(np.where(X < 50, 0.0, 0.01)) + np.random.default_rng(0).normal(0, 0.0005, (80, 120))
+        assert segmentRegions(height, heightMap=True, noise=0.0005).max() == 2
+        labels = segmentRegions(offset + height, heightMap=True, noise=0.0005)
+        one_region_each(labels, np.s_[:, :49], np.s_[:, 51:])
+
+    def test_large_offset_of_singles_is_rounding(self):
+        # Multiples of 0.5 around a slope of 0.1: one plane, since nobody can know better.
+        plane = (5e6 + columns(0.1 * X)).astype(np.float32)
+        assert (segmentRegions(plane, heightMap=True, noise=1e-3) == 1).all()
+
+    def test_pixels_without_data_are_far_from_seeds(self, monkeypatch):
+        # A gap of 9 columns, too wide to be bridged: seeds keep their distance from it as from an edge.
+        src = columns(0.1 * X)
+        src[:, 40:49] = np.nan
+        seen = []
+        monkeypatch.setattr("rangeedge.regions.find_seeds", lambda d, *a: seen.append(d) or find_seeds(d, *a))
+        segmentRegions(src, noise=SIGMA, edges=np.zeros(src.shape, np.uint8))
+        assert seen[0][40, [38, 39, 40, 48, 49, 50]].tolist() == [2, 1, 0, 0, 1, 2]
+
+    def test_skew_of_the_camera_matters(self):
+        # A face-on plane, and one turned about the vertical axis, meet without an edge: one surface up to 8 degrees.
+        rows, cols = np.mgrid[:120, :160]
+        pixels = np.stack([cols.ravel(), rows.ravel(), np.ones(cols.size)])
+        markers = markers_at(cols.shape, (slice(30, 90), slice(20, 60)), (slice(30, 90), slice(100, 140)))
+        for skew in (0.0, 100.0):
+            K = CAMERA.geometry["K"].copy()
+            K[0, 1] = skew
+            x = (np.linalg.inv(K) @ pixels)[0].reshape(cols.shape)
+            x -= x[60, 80]  # the planes meet in the middle
+            for degrees, count in ((6.5, 1), (9.5, 2)):
+                turned = 1 + np.tan(np.radians(degrees)) * x  # inverse depth
+                depth = 1 / np.where(x > 0, turned, 1) + np.random.default_rng(3).normal(0, 1e-4, x.shape)
+                assert growRegions(depth, markers, K=K, noise=1e-4).max() == count
+
+    def test_one_marker_beside_thousands(self):
+        # Cells that touch one long region alone, and join it: linear in their number.
+        src = np.zeros((400, 480))
+        rows, cols = np.indices(src.shape)
+        inside = rows % 8 > 0
+        src[inside & (cols % 8 == 7)] = np.nan
+        markers = np.where(inside, 2 + (rows // 8) * 60 + cols // 8, 1).astype(np.int32)
+        labels = growRegions(src, markers, noise=0.01)
+        assert (labels == np.isfinite(src)).all()
+
 
 class TestSurfaces:
     def test_planes(self):
@@ -272,6 +364,44 @@ class TestSurfaces:
         assert np.allclose(surfaces["normal"][1], normal, atol=1e-3)
         _, _, _, _, surfaces = segmentRegionsWithStats(height, pixelSize=(2.0, 1.0), noise=SIGMA)
         assert np.allclose(surfaces["normal"][1], (0.25 / np.hypot(0.25, 1), 0, -1 / np.hypot(0.25, 1)), atol=1e-3)
+
+    @pytest.mark.filterwarnings("error")
+    @pytest.mark.parametrize("pixelSize", [1e300, 1e-300, (1e-200, 1e200), (1e300, 1e-300)])
+    def test_extreme_scales(self, pixelSize):
+        plane = np.arange(3000.0).reshape(50, 60)
+        count, _, stats, _, surfaces = segmentRegionsWithStats(plane, pixelSize=pixelSize, noise=1.0)
+        assert (count, stats[1, cv2.CC_STAT_AREA]) == (2, 3000)
+        assert np.isfinite(surfaces["rms"]).all()
+        assert np.linalg.norm(surfaces["normal"][1]) == pytest.approx(1)
+
+    def test_against_direct_fits(self):
+        # Plane and quadric of each region from its points, once more and one by one.
+        camera = abwCamera()
+        scan = abwNoise(renderScene(curvedScene(4, camera), camera), seed=4)
+        count, labels, stats, centroids, surfaces = segmentRegionsWithStats(scan.src, **scan.geometry)
+        v, u = np.indices(labels.shape)
+        points = read_frame(scan.src, ScanLineParams(**scan.geometry)).points
+        assert surfaces["curved"].any()
+        for k in range(1, count):
+            inside = labels == k
+            p = points[inside]
+            assert np.allclose(surfaces["centroid"][k], p.mean(axis=0))
+            assert np.allclose(centroids[k], (u[inside].mean(), v[inside].mean()))
+            assert stats[k].tolist() == [
+                u[inside].min(), v[inside].min(), np.ptp(u[inside]) + 1, np.ptp(v[inside]) + 1, inside.sum()
+            ]  # fmt: skip
+            x, y, z = p.T
+            columns = np.stack([x * x, y * y, z * z, x * y, x * z, y * z, x, y, z, np.ones_like(x)])
+            q = surfaces["quadric"][k]
+            a, b, c, d, e, f, g, h, i, _ = q
+            gradient = np.stack([2*a*x + d*y + e*z + g, d*x + 2*b*y + f*z + h, e*x + f*y + 2*c*z + i])  # fmt: skip
+            length = np.linalg.norm(gradient, axis=0)
+            distance = q @ columns / np.maximum(length, 0.01)
+            assert np.sqrt(np.mean(length**2)) == pytest.approx(1, rel=1e-3)
+            assert surfaces["rms"][k] == pytest.approx(np.sqrt(np.mean(distance**2)), rel=1e-3)
+            if not surfaces["curved"][k]:
+                singular = np.linalg.svd(p - p.mean(axis=0), compute_uv=False)[2]
+                assert surfaces["rms"][k] == pytest.approx(singular / np.sqrt(len(p)), rel=1e-5)
 
     def test_nothing(self):
         count, labels, stats, centroids, surfaces = segmentRegionsWithStats(np.full((5, 6), np.nan))

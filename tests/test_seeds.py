@@ -60,6 +60,16 @@ class TestHandCases:
         _, markers = extractSeeds(distanceTransform(np.zeros((6, 7), np.uint8)))
         assert (markers == 1).all()
 
+    def test_separation_that_vanishes(self):
+        # 0 in single precision: nothing lies lower than no pixel at all, not even beside infinity.
+        distance = distanceTransform(np.zeros((40, 60), np.uint8))
+        assert (extractSeeds(distance, separation=1e-60)[1] == 1).all()
+        distance[:, 30] = 0
+        expected = np.ones((40, 60), np.int32)
+        expected[:, 30], expected[:, 31:] = 0, 2
+        assert np.array_equal(extractSeeds(distance, separation=1e-60)[1], expected)
+        assert rangeedge.segmentRegions(np.ones((40, 60)), separation=1e-60).max() == 1
+
     def test_nothing(self):
         count, markers = extractSeeds(np.zeros((3, 4), np.float32))
         assert count == 1
@@ -80,6 +90,31 @@ def test_oracle(seed, separation):
     distance = distanceTransform(random_edges(seed))
     _, markers = extractSeeds(distance, minDistance=2.0, separation=separation)
     assert as_sets(markers) == oracle(distance, 2.0, separation)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_oracle_with_ties_and_mask(seed):
+    # Few values, so that plateaus and equal passes abound.
+    rng = np.random.default_rng(seed)
+    distance = cv2.blur(rng.random((30, 40), np.float32), (5, 5))
+    distance = np.round((distance - distance.min()) * 20).astype(np.float32)
+    mask = rng.random(distance.shape) < 0.95
+    _, markers = extractSeeds(distance, minDistance=2.0, separation=0.5, mask=mask)
+    assert as_sets(markers) == oracle(np.where(mask, distance, 0), 2.0, 0.5)
+
+
+def test_threads_do_not_matter():
+    distance = distanceTransform(random_edges(7, (300, 400), 0.002))
+    threads = cv2.getNumThreads()
+    try:
+        results = []
+        for n in (1, 2, 7):
+            cv2.setNumThreads(n)
+            results.append(extractSeeds(distance)[1])
+    finally:
+        cv2.setNumThreads(threads)
+    assert results[0].max() > 20
+    assert all(np.array_equal(results[0], r) for r in results)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -16,6 +16,7 @@ public:
     explicit Array(Index size, const T& value = T()) : values_(at(size), value) {}
 
     Index size() const { return static_cast<Index>(values_.size()); }
+    int count() const { return static_cast<int>(values_.size()); }  // where that is known to suffice
     bool empty() const { return values_.empty(); }
     void resize(Index size) { values_.resize(at(size)); }
     void resize(Index size, const T& value) { values_.resize(at(size), value); }

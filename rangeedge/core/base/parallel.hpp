@@ -124,9 +124,13 @@ void parallel_for(int count, Team& team, F&& body) {
 template <class F>
 void parallel_each(int count, Team& team, F&& body) {
     std::atomic<int> next{0};
-    team.run([&](int thread) {
+    const auto work = [&](int thread) {
         for (int i = next++; i < count; i = next++) body(i, thread);
-    });
+    };
+    if (count > 1)
+        team.run(work);
+    else
+        work(0);
 }
 
 template <class F>

@@ -13,6 +13,8 @@
 #include <utility>
 #include <vector>
 
+#include "base/disjoint_sets.hpp"
+
 namespace rangeedge {
 
 // Components of equal values other than 0, in raster order of first pixels. Images have a margin of one pixel, all 0,
@@ -33,15 +35,7 @@ public:
     Components(const T* image, int rows, int cols, int connectivity = 4) : stride_(cols + 2) {
         const int stride = stride_, reach = connectivity == 8;
         std::vector<Run> found;
-        std::vector<int> parent;  // of runs; roots are first in raster order
-        const auto root = [&](std::size_t i) {
-            int r = static_cast<int>(i);
-            while (parent[static_cast<std::size_t>(r)] != r) {
-                int& up = parent[static_cast<std::size_t>(r)];
-                r = up = parent[static_cast<std::size_t>(up)];
-            }
-            return r;
-        };
+        DisjointSets sets;      // of runs; the first in raster order represents each
         std::size_t above = 0;  // first run that may touch the next one from the row above
         for (int row = 0; row < rows; ++row) {
             const std::size_t row_begin = found.size();
@@ -53,17 +47,18 @@ public:
                 const Run run{begin, p};
                 const std::size_t i = found.size();
                 found.push_back(run);
-                parent.push_back(static_cast<int>(i));
+                sets.add();
                 while (above < row_begin && found[above].end + stride + reach <= run.begin) ++above;
                 for (std::size_t k = above; k < row_begin && found[k].begin + stride < run.end + reach; ++k) {
                     if (image[found[k].begin] != value) continue;
-                    const auto [low, high] = std::minmax({root(k), root(i)});
-                    parent[static_cast<std::size_t>(high)] = low;
+                    const auto [low, high] =
+                        std::minmax({sets.find(static_cast<int>(k)), sets.find(static_cast<int>(i))});
+                    sets.link(high, low);
                 }
             }
             above = row_begin;
         }
-        sort(found, parent);
+        sort(found, sets);
     }
 
     int count() const { return static_cast<int>(areas_.size()); }
@@ -88,25 +83,25 @@ private:
         return p;
     }
 
-    void sort(const std::vector<Run>& found, std::vector<int>& parent) {
-        std::vector<std::size_t> sizes;
+    void sort(const std::vector<Run>& found, DisjointSets& sets) {
+        std::vector<std::size_t> sizes, component(found.size());
         for (std::size_t i = 0; i < found.size(); ++i) {
-            int& own = parent[i];  // becomes the component of the run
-            if (own == static_cast<int>(i)) {
-                own = count();
+            const auto root = static_cast<std::size_t>(sets.find(static_cast<int>(i)));
+            if (root == i) {
+                component[i] = areas_.size();
                 areas_.push_back(0);
                 sizes.push_back(0);
             } else {
-                own = parent[static_cast<std::size_t>(own)];
+                component[i] = component[root];
             }
-            areas_[static_cast<std::size_t>(own)] += found[i].end - found[i].begin;
-            ++sizes[static_cast<std::size_t>(own)];
+            areas_[component[i]] += found[i].end - found[i].begin;
+            ++sizes[component[i]];
         }
         starts_.assign(1, 0);
         for (const std::size_t size : sizes) starts_.push_back(starts_.back() + size);
         runs_.resize(found.size());
         auto next = starts_;
-        for (std::size_t i = 0; i < found.size(); ++i) runs_[next[static_cast<std::size_t>(parent[i])]++] = found[i];
+        for (std::size_t i = 0; i < found.size(); ++i) runs_[next[component[i]]++] = found[i];
     }
 
     int stride_;

@@ -6,15 +6,16 @@
 #include <vector>
 
 #include "image/components.hpp"
+#include "regions/roof.hpp"
 
 namespace rangeedge {
 namespace {
 
 class Closer {
 public:
-    Closer(const RangeMap& map, const ClosureParameters& parameters)
-        : image_(map, lateral_deviation), parameters_(parameters), region_(size(), 0) {
-        image_.set_correlation(parameters.correlation);
+    Closer(const RangeMap& map, const ClosureParameters& parameters, Team& team)
+        : image_(map, lateral_deviation, team), parameters_(parameters), region_(size(), 0) {
+        image_.set_correlation(parameters.correlation, 1);
     }
 
     void verify();
@@ -47,13 +48,13 @@ bool Closer::lies_on(const Pixels& pixels, const Surface& surface) const {
 
 // A plane, or a quadratic that two planes do not beat.
 bool Closer::is_surface(const Pixels& pixels) const {
-    if (pixels.size() < least_pixels) return false;
     const SurfaceSums sums = image_.sums_of(pixels);
+    if (sums.count() < least_pixels) return false;
     if (lies_on(pixels, sums.plane())) return true;
     const Surface curved = sums.quadratic();
-    if (pixels.size() < least_curved || !lies_on(pixels, curved)) return false;
+    if (sums.count() < least_curved || !lies_on(pixels, curved)) return false;
     Pixels first, second;
-    return !image_.split_roof(pixels, curved, first, second);
+    return !split_roof(image_, pixels, curved, first, second);
 }
 
 // By a square or a cross; what lies outside the image takes nothing away. Returns whether anything was.
@@ -134,8 +135,9 @@ void Closer::write(std::int32_t* regions) const {
 
 }  // namespace
 
-void verified_regions(const RangeMap& map, const ClosureParameters& parameters, std::int32_t* regions) {
-    Closer closer(map, parameters);
+void verified_regions(const RangeMap& map, const ClosureParameters& parameters, int threads, std::int32_t* regions) {
+    Team team(threads);
+    Closer closer(map, parameters, team);
     closer.verify();
     closer.grow_back();
     closer.write(regions);

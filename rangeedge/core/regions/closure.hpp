@@ -17,6 +17,6 @@ struct ClosureParameters {
 };
 
 // Labels 1, 2, ... of the parts of what is no edge that are surfaces, grown back over the rest of it; 0 elsewhere.
-void verified_regions(const RangeMap& map, const ClosureParameters& parameters, std::int32_t* regions);
+void verified_regions(const RangeMap& map, const ClosureParameters& parameters, int threads, std::int32_t* regions);
 
 }  // namespace rangeedge

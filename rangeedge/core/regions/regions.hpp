@@ -16,7 +16,7 @@ struct RegionParameters {
 };
 
 // Labels 1..n in raster order of first pixels, 0 where no surface fits; returns n.
-int grow_regions(const RangeMap& map, const std::int32_t* markers, const RegionParameters& parameters,
+int grow_regions(const RangeMap& map, const std::int32_t* markers, const RegionParameters& parameters, int threads,
                  std::int32_t* labels);
 
 }  // namespace rangeedge

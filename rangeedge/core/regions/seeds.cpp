@@ -1,3 +1,9 @@
+// Uphill from every pixel, always to the highest neighbour, leads to a summit; the pixels that lead to it are a basin.
+// Two neighbouring basins are linked by a pass: of the pairs of neighbouring pixels across their border, the one whose
+// lower pixel is highest. The best way between two summits goes from basin to basin over passes, since within a basin
+// it only goes up and down again. So a few summits and passes tell what all the pixels do. Passes are taken in falling
+// order, as water that sinks uncovers them: each joins two islands, and the lower of their peaks counts by itself if
+// the pass is low beside it.
 // SPDX-License-Identifier: Apache-2.0
 #include "regions/seeds.hpp"
 
@@ -9,179 +15,202 @@
 #include <utility>
 #include <vector>
 
+#include "base/array.hpp"
+#include "base/disjoint_sets.hpp"
+#include "base/parallel.hpp"
+
 namespace rangeedge {
 namespace {
 
-using Index = std::int32_t;
-
-// A pixel by falling distance, equal ones by rising index: the bits of floats >= 0 are ordered as their values are.
-struct Place {
-    std::uint32_t fall;
-    Index pixel;
-};
-
-Place place_of(float distance, Index pixel) {
-    std::uint32_t bits;
-    std::memcpy(&bits, &distance, sizeof bits);
-    return {~bits, pixel};
+// The bits of floats >= 0 are ordered as their values are, and compared faster.
+std::int32_t bits_of(float value) {
+    std::int32_t bits;
+    std::memcpy(&bits, &value, sizeof bits);
+    return bits;
+}
+float value_of(std::int32_t bits) {
+    float value;
+    std::memcpy(&value, &bits, sizeof value);
+    return value;
 }
 
-// By rising `fall`; equal ones stay in order.
-void sort(std::vector<Place>& places) {
-    constexpr int bits = 13, most_passes = 3;
-    constexpr std::uint32_t digits = 1u << bits;
-    std::uint32_t least = ~0u, most = 0;
-    for (const Place& place : places) least = std::min(least, place.fall), most = std::max(most, place.fall);
-    int passes = 0;
-    while (passes < most_passes && !places.empty() && (most - least) >> (passes * bits)) ++passes;
-    const auto digit = [=](const Place& place, int pass) {
-        return ((place.fall - least) >> (pass * bits)) & (digits - 1);
-    };
-    std::vector<std::array<std::uint32_t, digits>> start(most_passes);
-    for (const Place& place : places)
-        for (int pass = 0; pass < passes; ++pass) ++start[static_cast<std::size_t>(pass)][digit(place, pass)];
-    std::vector<Place> other(places.size());
-    for (int pass = 0; pass < passes; ++pass) {
-        auto& next = start[static_cast<std::size_t>(pass)];
-        std::uint32_t sum = 0;
-        for (std::uint32_t& n : next) sum += std::exchange(n, sum);
-        for (const Place& place : places) other[next[digit(place, pass)]++] = place;
-        places.swap(other);
+// Where a row of neighbours is higher than what was found so far, they and the step to them take its place.
+void keep_highest(const std::int32_t* __restrict beside, std::int32_t step, int n, std::int32_t* __restrict highest,
+                  std::int32_t* __restrict to) {
+    for (int k = 0; k < n; ++k) {
+        const std::int32_t better = -(beside[k] > highest[k]);
+        highest[k] = (beside[k] & better) | (highest[k] & ~better);
+        to[k] = (step & better) | (to[k] & ~better);
     }
 }
 
-// Of which of the eight neighbours one of each connected group is the first, by which of them there are.
-constexpr std::array<std::uint8_t, 256> first_of_groups() {
-    constexpr int x[8] = {-1, 0, 1, -1, 1, -1, 0, 1}, y[8] = {-1, -1, -1, 0, 0, 1, 1, 1};
-    std::array<std::uint8_t, 256> first{};
-    for (unsigned there = 0; there < 256; ++there)
-        for (unsigned rest = there; rest;) {
-            unsigned group = rest & (0u - rest);
-            first[there] = static_cast<std::uint8_t>(first[there] | group);
-            for (unsigned before = 0; before != group;) {
-                before = group;
-                for (int i = 0; i < 8; ++i)
-                    for (int j = 0; j < 8; ++j)
-                        if ((before >> i & 1) && (rest >> j & 1) && (x[i] - x[j]) * (x[i] - x[j]) <= 1 &&
-                            (y[i] - y[j]) * (y[i] - y[j]) <= 1)
-                            group |= 1u << j;
-            }
-            rest &= ~group;
-        }
-    return first;
-}
+struct Pass {
+    std::int32_t level;  // bits of its distance
+    int a, b;            // summits on either side, in order of index
 
-// Sinking water: islands are the components of what lies above the level, each known by its peak.
-class Islands {
+    bool same_sides(const Pass& other) const { return a == other.a && b == other.b; }
+};
+
+// A distance map in an image with a margin of one pixel; 0 is no pixel.
+class DistanceImage {
 public:
-    Islands(const std::vector<float>& distance, float separation) : distance_(distance), separation_(separation) {}
+    DistanceImage(const float* distance, const std::uint8_t* mask, int rows, int cols, float lowest, Team& team)
+        : rows_(rows), cols_(cols), team_(team), level_((rows + 2) * stride(), 0) {
+        parallel_for(rows, team, [&](int first, int last, int) {
+            for (int row = first; row < last; ++row)
+                for (int col = 0; col < cols; ++col) {
+                    const int k = row * cols + col;
+                    const bool exists = distance[k] > 0 && !(distance[k] < lowest) && (!mask || mask[k]);
+                    level_[index(row, col)] = exists ? bits_of(distance[k]) : 0;
+                }
+        });
+    }
 
-    // Peaks by themselves of the pixels in `order`, which fall in distance. Pixels have an index in an image with a
-    // margin; `neighbours` are the steps to the eight around, in raster order.
-    std::vector<Index> peaks(const std::vector<Place>& order, const std::array<Index, 8>& neighbours);
+    int stride() const { return cols_ + 2; }
+    int index(int row, int col) const { return (row + 1) * stride() + col + 1; }
+    int size() const { return level_.count(); }
+    float operator[](int p) const { return value_of(level_[p]); }
+    bool reaches(int p, std::int32_t least) const { return level_[p] >= least; }
+    std::array<int, 8> neighbours() const {
+        const int s = stride();
+        return {-s - 1, -s, -s + 1, -1, 1, s - 1, s, s + 1};
+    }
+    // Of two pixels of one distance, that of lower index is the higher.
+    bool higher(int p, int q) const { return level_[p] > level_[q] || (level_[p] == level_[q] && p < q); }
+
+    Array<int> basins() const;
+    std::vector<Pass> passes(const Array<int>& summit) const;
+    template <class F>
+    void for_pixels(int first, int last, F&& visit) const {
+        for (int row = first; row < last; ++row)
+            for (int p = index(row, 0), end = p + cols_; p < end; ++p)
+                if (level_[p] > 0) visit(p);
+    }
+    int rows() const { return rows_; }
 
 private:
-    struct Island {
-        Index peak;
-        std::size_t home;  // the island that has taken this one in, or itself
-    };
-
-    std::size_t home(std::size_t i) {
-        while (island_[i].home != i) i = island_[i].home = island_[island_[i].home].home;
-        return i;
-    }
-    float top(std::size_t i) const { return distance_[static_cast<std::size_t>(island_[i].peak)]; }
-    std::size_t join(std::size_t low, std::size_t high, float level);
-
-    const std::vector<float>& distance_;
-    float separation_;
-    std::vector<Island> island_;
-    std::vector<Index> found_;
+    int rows_, cols_;
+    Team& team_;
+    Array<std::int32_t> level_;  // bits of distances
 };
 
-// The higher island, or that of lower index, takes in the other, and keeps its number.
-std::size_t Islands::join(std::size_t low, std::size_t high, float level) {
-    if (low == high) return high;
-    const Index a = island_[low].peak, b = island_[high].peak;
-    if (top(low) > top(high) || (top(low) == top(high) && a < b)) std::swap(low, high);
-    if (level < separation_ * top(low)) found_.push_back(island_[low].peak);
-    island_[low].home = high;
-    return high;
+// The summit of every pixel.
+Array<int> DistanceImage::basins() const {
+    Array<int> uphill(level_.size(), 0);
+    const auto around = neighbours();
+    // A row at a time, without branches, so that many pixels are compared at once.
+    parallel_for(rows_, team_, [&](int first, int last, int) {
+        std::vector<std::int32_t> top(static_cast<std::size_t>(cols_));
+        for (int row = first; row < last; ++row) {
+            const int begin = index(row, 0);
+            const std::int32_t* const own = &level_[begin];
+            int* const to = &uphill[begin];
+            std::fill(top.begin(), top.end(), -1);
+            for (std::size_t k = 0; k < 4; ++k)
+                keep_highest(own + around[k], around[k], cols_, top.data(), to);  // of lower index: higher where equal
+            keep_highest(own, 0, cols_, top.data(), to);
+            for (std::size_t k = 4; k < 8; ++k) keep_highest(own + around[k], around[k], cols_, top.data(), to);
+            for (int k = 0; k < cols_; ++k) to[k] += begin + k;
+        }
+    });
+    // Ways are shortened while they are followed.
+    for_pixels(0, rows_, [&](int p) {
+        int q = p;
+        while (uphill[q] != q) q = uphill[q] = uphill[uphill[q]];
+        uphill[p] = q;
+    });
+    return uphill;
 }
 
-std::vector<Index> Islands::peaks(const std::vector<Place>& order, const std::array<Index, 8>& neighbours) {
-    static constexpr std::array<std::uint8_t, 256> first = first_of_groups();
-    const std::array<Index, 8> steps = neighbours;
-    std::vector<std::uint8_t> above(distance_.size(), 0);  // which neighbours are
-    std::vector<std::uint32_t> number(distance_.size());   // of a pixel's island
-    for (const Place& place : order) {
-        const auto p = static_cast<std::size_t>(place.pixel);
-        // Neighbours that touch each other are on one island.
-        const unsigned groups = first[above[p]];
-        std::size_t own = island_.size();
-        if (!groups) island_.push_back({place.pixel, own});
-        for (std::size_t i = 0; groups >> i; ++i)
-            if (groups >> i & 1) {
-                const std::size_t other = home(number[static_cast<std::size_t>(place.pixel + steps[i])]);
-                own = own == island_.size() ? other : join(own, other, distance_[p]);
+// The highest pass between any two basins that touch, the highest first.
+std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
+    std::vector<std::vector<Pass>> found(static_cast<std::size_t>(team_.size()));
+    const std::array<int, 4> forward{1, stride() - 1, stride(), stride() + 1};
+    parallel_for(rows_, team_, [&](int first, int last, int thread) {
+        auto& passes = found[static_cast<std::size_t>(thread)];
+        for_pixels(first, last, [&](int p) {
+            if (((summit[p] ^ summit[p + 1]) | (summit[p] ^ summit[p + stride() - 1]) |
+                 (summit[p] ^ summit[p + stride()]) | (summit[p] ^ summit[p + stride() + 1])) == 0)
+                return;
+            for (const int step : forward) {
+                const int a = summit[p], b = summit[p + step];
+                if (a == b || !(level_[p + step] > 0)) continue;
+                const Pass pass{std::min(level_[p], level_[p + step]), std::min(a, b), std::max(a, b)};
+                if (!passes.empty() && passes.back().same_sides(pass))
+                    passes.back().level = std::max(passes.back().level, pass.level);
+                else
+                    passes.push_back(pass);
             }
-        number[p] = static_cast<std::uint32_t>(own);
-        for (std::size_t i = 0; i < 8; ++i)
-            above[static_cast<std::size_t>(place.pixel + steps[i])] |= static_cast<std::uint8_t>(128u >> i);
+        });
+    });
+    std::vector<Pass> all;
+    for (const auto& passes : found) all.insert(all.end(), passes.begin(), passes.end());
+    std::sort(all.begin(), all.end(), [](const Pass& m, const Pass& n) {
+        return m.level != n.level ? m.level > n.level : std::make_pair(m.a, m.b) < std::make_pair(n.a, n.b);
+    });
+    return all;
+}
+
+// Summits that count by themselves.
+std::vector<int> peaks(const DistanceImage& image, const Array<int>& summit, float separation) {
+    std::vector<int> summits;
+    image.for_pixels(0, image.rows(), [&](int p) {
+        if (summit[p] == p) summits.push_back(p);
+    });
+    // Islands are known by the number of their highest summit, in raster order.
+    DisjointSets islands(static_cast<int>(summits.size()));
+    const auto number = [&](int p) {
+        return static_cast<int>(std::lower_bound(summits.begin(), summits.end(), p) - summits.begin());
+    };
+    const auto at = [&](int i) { return summits[static_cast<std::size_t>(i)]; };
+    std::vector<int> found;
+    for (const Pass& pass : image.passes(summit)) {
+        int low = islands.find(number(pass.a)), high = islands.find(number(pass.b));
+        if (low == high) continue;
+        if (image.higher(at(low), at(high))) std::swap(low, high);
+        if (value_of(pass.level) < separation * image[at(low)]) found.push_back(at(low));
+        islands.link(low, high);
     }
-    for (std::size_t i = 0; i < island_.size(); ++i)
-        if (island_[i].home == i) found_.push_back(island_[i].peak);
-    return std::move(found_);
+    for (int i = 0; i < islands.size(); ++i)
+        if (islands.is_root(i)) found.push_back(at(i));
+    return found;
 }
 
 }  // namespace
 
 int extract_seeds(const float* distance, const std::uint8_t* mask, int height, int width, float min_distance,
-                  float separation, std::int32_t* markers) {
-    const Index stride = width + 2;
-    const std::array<Index, 8> neighbours{-stride - 1, -stride, -stride + 1, -1, 1, stride - 1, stride, stride + 1};
-    const float lowest = separation * min_distance;
-    std::vector<float> inside(static_cast<std::size_t>(stride) * static_cast<std::size_t>(height + 2), 0);
-    std::vector<Place> order;
-    order.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-    for (int row = 0; row < height; ++row)
-        for (int col = 0; col < width; ++col) {
-            const Index k = row * width + col, p = (row + 1) * stride + col + 1;
-            if (!(distance[k] > 0) || distance[k] < lowest || (mask && !mask[k])) continue;
-            inside[static_cast<std::size_t>(p)] = distance[k];
-            order.push_back(place_of(distance[k], p));
-        }
-    sort(order);
-
+                  float separation, int threads, std::int32_t* markers) {
+    Team team(threads);
+    const DistanceImage image(distance, mask, height, width, separation * min_distance, team);
     // Flood every seed from its peak.
-    std::vector<Index> seed(inside.size(), 0), stack;
-    Index seeds = 0;
-    for (const Index peak : Islands(inside, separation).peaks(order, neighbours)) {
-        const float top = inside[static_cast<std::size_t>(peak)];
-        if (top < min_distance) continue;
-        const float least = std::max(separation * top, std::numeric_limits<float>::denorm_min());
-        seed[static_cast<std::size_t>(peak)] = ++seeds;
+    Array<int> seed(image.size(), 0);
+    std::vector<int> stack;
+    int seeds = 0;
+    for (const int peak : peaks(image, image.basins(), separation)) {
+        if (image[peak] < min_distance) continue;
+        // Where all is infinitely far, or `separation` vanishes in single precision, nothing but no pixel is too low.
+        const float share = separation * image[peak];
+        const std::int32_t least = bits_of(share > 0 ? share : std::numeric_limits<float>::denorm_min());
+        seed[peak] = ++seeds;
         stack.assign(1, peak);
         while (!stack.empty()) {
-            const Index p = stack.back();
+            const int p = stack.back();
             stack.pop_back();
-            for (const Index step : neighbours) {
-                const auto q = static_cast<std::size_t>(p + step);
-                if (inside[q] < least || seed[q]) continue;
-                seed[q] = seeds;
+            for (const int step : image.neighbours()) {
+                if (!image.reaches(p + step, least) || seed[p + step]) continue;
+                seed[p + step] = seeds;
                 stack.push_back(p + step);
             }
         }
     }
     // Number them.
-    std::vector<Index> number(static_cast<std::size_t>(seeds) + 1, 0);
-    Index count = 0;
+    Array<int> number(seeds + 1, 0);
+    int count = 0;
     for (int row = 0; row < height; ++row)
         for (int col = 0; col < width; ++col) {
-            const Index own = seed[static_cast<std::size_t>((row + 1) * stride + col + 1)];
-            Index& n = number[static_cast<std::size_t>(own)];
-            if (own && !n) n = ++count;
-            markers[row * width + col] = n;
+            const int own = seed[image.index(row, col)];
+            if (own && !number[own]) number[own] = ++count;
+            markers[row * width + col] = number[own];
         }
     return count;
 }

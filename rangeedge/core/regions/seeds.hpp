@@ -11,6 +11,6 @@ namespace rangeedge {
 // times its distance; its seed is the connected set around it that does not. Pixels with `mask` 0 (it may be null) do
 // not exist. Seeds are numbered in raster order of their first pixels.
 int extract_seeds(const float* distance, const std::uint8_t* mask, int height, int width, float min_distance,
-                  float separation, std::int32_t* markers);
+                  float separation, int threads, std::int32_t* markers);
 
 }  // namespace rangeedge

@@ -16,53 +16,66 @@ constexpr std::size_t place(int i, int j) { return static_cast<std::size_t>((i +
 // Pivots below this share of their diagonal are taken for zero: that direction is not determined by the samples.
 constexpr double dependent = 1e-9;
 
+// Power sums of degree up to n when every u grows by a and every v by b: the binomial expansion, by repeated addition
+// in place (Horner's scheme).
+template <int n, std::size_t size>
+void shift(std::array<double, size>& sums, double a, double b) {
+    for (int j = 0; j < n; ++j)
+        for (int round = 1; round <= n - j; ++round)
+            for (int i = n - j; i >= round; --i) {
+                sums[place(i, j)] += a * sums[place(i - 1, j)];
+            }
+    for (int i = 0; i < n; ++i)
+        for (int round = 1; round <= n - i; ++round)
+            for (int j = n - i; j >= round; --j) sums[place(i, j)] += b * sums[place(i, j - 1)];
+}
+
 }  // namespace
 
 SurfaceSums SurfaceSums::moved(double x0, double y0, double base) const {
-    static constexpr int choose[5][5] = {{1}, {1, 1}, {1, 2, 1}, {1, 3, 3, 1}, {1, 4, 6, 4, 1}};
-    std::array<double, 5> a{1}, b{1};
-    for (std::size_t k = 1; k < 5; ++k) a[k] = a[k - 1] * (x0_ - x0), b[k] = b[k - 1] * (y0_ - y0);
+    SurfaceSums m = *this;
     const double d = base_ - base;
-    SurfaceSums m(x0, y0, base);
-    m.count_ = count_;
-    for (int degree = 0; degree <= 4; ++degree)
-        for (int j = 0; j <= degree; ++j)
-            for (int k = 0, i = degree - j; k <= i; ++k)
-                for (int l = 0; l <= j; ++l) {
-                    const std::size_t from = place(k, l), to = place(i, j);
-                    const double factor = choose[i][k] * a[static_cast<std::size_t>(i - k)] * choose[j][l] *
-                                          b[static_cast<std::size_t>(j - l)];
-                    m.power_[to] += factor * power_[from];
-                    if (degree <= 2) m.product_[to] += factor * (product_[from] + d * power_[from]);
-                }
-    m.square_ = square_ + d * (2 * product_[0] + d * power_[0]);
+    m.square_ += d * (2 * m.product_[0] + d * m.power_[0]);
+    for (std::size_t k = 0; k < 6; ++k) m.product_[k] += d * m.power_[k];
+    shift<4>(m.power_, x0_ - x0, y0_ - y0);
+    shift<2>(m.product_, x0_ - x0, y0_ - y0);
+    m.x0_ = x0, m.y0_ = y0, m.base_ = base;
     return m;
+}
+
+void SurfaceSums::add(const SurfaceSums& other) {
+    const SurfaceSums b = other.moved(x0_, y0_, base_);
+    for (std::size_t k = 0; k < power_.size(); ++k) power_[k] += b.power_[k];
+    for (std::size_t k = 0; k < product_.size(); ++k) product_[k] += b.product_[k];
+    square_ += b.square_;
+    count_ += b.count_;
 }
 
 SurfaceSums SurfaceSums::joined(const SurfaceSums& other) const {
     const double wa = power_[0], wb = other.power_[0], share = wa + wb > 0 ? wb / (wa + wb) : 0;
-    const double x = x0_ + share * (other.x0_ - x0_), y = y0_ + share * (other.y0_ - y0_);
-    const double base = base_ + share * (other.base_ - base_);
-    SurfaceSums sum = moved(x, y, base);
-    const SurfaceSums b = other.moved(x, y, base);
-    for (std::size_t k = 0; k < power_.size(); ++k) sum.power_[k] += b.power_[k];
-    for (std::size_t k = 0; k < product_.size(); ++k) sum.product_[k] += b.product_[k];
-    sum.square_ += b.square_;
-    sum.count_ += b.count_;
+    SurfaceSums sum =
+        moved(x0_ + share * (other.x0_ - x0_), y0_ + share * (other.y0_ - y0_), base_ + share * (other.base_ - base_));
+    sum.add(other);
     return sum;
 }
 
 double SurfaceSums::rms(const Surface& surface) const {
-    const SurfaceSums here = moved(surface.x0, surface.y0, base_);
-    std::array<double, 6> c = surface.c;
-    c[0] -= base_;
-    double sum = here.square_;
-    for (std::size_t i = 0; i < c.size(); ++i) {
-        sum -= 2 * c[i] * here.product_[i];
-        for (std::size_t j = 0; j < c.size(); ++j)
-            sum += c[i] * c[j] * here.power_[place(power_u[i] + power_u[j], power_v[i] + power_v[j])];
+    if (count_ == 0) return 0;
+    // The surface as counted from the origin of the sums.
+    const std::array<double, 6> c{surface.value(x0_, y0_) - base_,
+                                  surface.slope_x(x0_, y0_),
+                                  surface.slope_y(x0_, y0_),
+                                  surface.c[3],
+                                  surface.c[4],
+                                  surface.c[5]};
+    const std::size_t terms = surface.curved ? 6 : 3;
+    double sum = square_;
+    for (std::size_t i = 0; i < terms; ++i) {
+        sum += c[i] * (c[i] * power_[place(2 * power_u[i], 2 * power_v[i])] - 2 * product_[i]);
+        for (std::size_t j = 0; j < i; ++j)
+            sum += 2 * c[i] * c[j] * power_[place(power_u[i] + power_u[j], power_v[i] + power_v[j])];
     }
-    return count_ > 0 ? std::sqrt(std::max(0.0, sum) / count_) : 0;
+    return std::sqrt(std::max(0.0, sum) / count_);
 }
 
 // Cholesky on the normal equations, scaled to a unit diagonal.

@@ -28,7 +28,8 @@ struct Surface {
     double slope_y(double x, double y) const { return c[2] + c[4] * (x - x0) + 2 * c[5] * (y - y0); }
 };
 
-// Weighted power sums of samples, counted from an origin that is set once.
+// Weighted power sums of samples, counted from an origin that is set once. All that a least-squares fit needs of any
+// number of pixels stands in 22 numbers, and those of two sets of pixels add up to those of both.
 class SurfaceSums {
 public:
     SurfaceSums() = default;
@@ -56,13 +57,17 @@ public:
         square_ += w * f * f;
         ++count_;
     }
-    int count() const { return count_; }
-    double x0() const { return x0_; }
-    double y0() const { return y0_; }
-    double base() const { return base_; }
+    // The samples of another set, too.
+    void add(const SurfaceSums& other);
 
-    // The same sums counted from another origin, and those of two sets together.
-    SurfaceSums moved(double x0, double y0, double base) const;
+    int count() const { return count_; }
+    double weight() const { return power_[0]; }
+    // The mean ordinate, and the mean place.
+    double mean_ordinate() const { return base_ + (power_[0] > 0 ? product_[0] / power_[0] : 0); }
+    double mean_x() const { return x0_ + (power_[0] > 0 ? power_[1] / power_[0] : 0); }
+    double mean_y() const { return y0_ + (power_[0] > 0 ? power_[2] / power_[0] : 0); }
+
+    // The sums of two sets together, counted from about the middle of both.
     SurfaceSums joined(const SurfaceSums& other) const;
 
     // Root mean square of the weighted residuals from a surface.
@@ -72,6 +77,7 @@ public:
     Surface quadratic() const { return fit(6); }
 
 private:
+    SurfaceSums moved(double x0, double y0, double base) const;
     Surface fit(int terms) const;
 
     double x0_ = 0, y0_ = 0, base_ = 0;

@@ -2,80 +2,70 @@
 #include "regions/surface_image.hpp"
 
 #include <algorithm>
+#include <cstddef>
 #include <limits>
-#include <utility>
 
 namespace rangeedge {
 namespace {
 
 constexpr double flat = 1.25;        // rms in standard deviations up to which a plane is one
 constexpr double curved_gain = 0.8;  // a quadratic must lower the rms to this share
-constexpr double roof_gain = 0.97;   // two planes must lower the rms of the quadratic to this share
-constexpr int roof_rounds = 8;
-constexpr double rounding = 2.5;         // pixels on either side of a ridge
-constexpr double correlation_max = 4.0;  // noise over a region, in units of that between pixels
-constexpr double resolution = 1e-6;      // of ordinates in single precision
-constexpr int sample_step = 7;           // one pixel in so many tells the typical noise
-const double pi = std::acos(-1.0);
+constexpr double resolution = 1e-6;  // of ordinates in single precision
+constexpr int sample_step = 61;      // one pixel in so many tells the typical noise
+
+struct Range {
+    float low = 0, high = 0;
+};
 
 }  // namespace
 
-SurfaceImage::SurfaceImage(const RangeMap& map, double lateral)
+SurfaceImage::SurfaceImage(const RangeMap& map, double lateral, Team& team)
     : rows_(map.rows), cols_(map.cols), projective_(map.projective), lateral_(lateral), offset_(map.offset),
-      to_plane_(map.to_plane), pixel_(static_cast<std::size_t>(size())),
-      state_(static_cast<std::size_t>(size()), none) {
-    float low = 0, high = 0;
-    for (int k = 0; k < rows_ * cols_; ++k)
-        if (std::isfinite(map.ordinate[k])) {
-            low = std::min(low, map.ordinate[k]);
-            high = std::max(high, map.ordinate[k]);
+      to_plane_(map.to_plane), pixel_(new Pixel[static_cast<std::size_t>(size())]), state_(size(), none) {
+    Array<Range> ranges(team.size());
+    parallel_for(rows_ * cols_, team, [&](int begin, int end, int thread) {
+        Range range;
+        for (int k = begin; k < end; ++k) {
+            const float f = std::isfinite(map.ordinate[k]) ? map.ordinate[k] : 0.0f;
+            range.low = std::min(range.low, f), range.high = std::max(range.high, f);
         }
-    const double extent = static_cast<double>(high) - static_cast<double>(low) + std::abs(offset_);
-    const double least = std::max(resolution * extent, std::numeric_limits<double>::min());
+        ranges[thread] = range;
+    });
+    Range all;
+    for (const Range& r : ranges) all = {std::min(all.low, r.low), std::max(all.high, r.high)};
+    const double extent = static_cast<double>(all.high) - static_cast<double>(all.low);
+    const double least = std::max({resolution * extent, map.rounding, std::numeric_limits<double>::min()});
     const auto sigma = [&](int k) {
         return std::max(map.noise.sigma(offset_ + static_cast<double>(map.ordinate[k]), k, projective_), least);
     };
     std::vector<double> sigmas;
     for (int k = 0; k < rows_ * cols_; k += sigmas.empty() ? 1 : sample_step - k % sample_step)
         if (std::isfinite(map.ordinate[k])) sigmas.push_back(sigma(k));
-    if (sigmas.empty()) return;
+    if (sigmas.empty()) sigmas.push_back(1);
     const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
     std::nth_element(sigmas.begin(), middle, sigmas.end());
     unit_ = *middle;
-    for (int row = 0; row < rows_; ++row)
-        for (int col = 0; col < cols_; ++col) {
-            const int k = row * cols_ + col;
-            if (!std::isfinite(map.ordinate[k])) continue;
-            const auto p = static_cast<std::size_t>(index(row, col));
-            const double s = sigma(k) / unit_;
-            pixel_[p] = {map.x ? map.x[k] : static_cast<float>(col), map.y ? map.y[k] : static_cast<float>(row),
-                         static_cast<float>(static_cast<double>(map.ordinate[k]) / unit_), static_cast<float>(s * s)};
-            state_[p] = map.edges && map.edges[k] ? edge_pixel : plain;
-        }
+    const double per_unit = 1 / unit_;
+    // Every thread writes its rows first, so that it also is the one that has their memory allocated.
+    parallel_for(rows_ + 2, team, [&](int first, int last, int) {
+        std::fill_n(&pixel_[static_cast<std::size_t>(first * stride())], (last - first) * stride(), Pixel{});
+        for (int row = std::max(first - 1, 0); row < std::min(last - 1, rows_); ++row)
+            for (int col = 0; col < cols_; ++col) {
+                const int k = row * cols_ + col, p = index(row, col);
+                if (!std::isfinite(map.ordinate[k])) continue;
+                const double s = sigma(k) * per_unit;
+                pixel_[static_cast<std::size_t>(p)] = {
+                    map.x ? map.x[k] : static_cast<float>(col), map.y ? map.y[k] : static_cast<float>(row),
+                    static_cast<float>(static_cast<double>(map.ordinate[k]) * per_unit), static_cast<float>(s * s)};
+                state_[p] = map.edges && map.edges[k] ? edge_pixel : plain;
+            }
+    });
 }
 
-bool SurfaceImage::beside_edge(int p) const {
-    const int s = stride();
-    for (const int q : {p, p - s - 1, p - s, p - s + 1, p - 1, p + 1, p + s - 1, p + s, p + s + 1})
-        if (edge(q)) return true;
-    return false;
-}
-
-void SurfaceImage::estimate_correlation(const std::vector<Pixels>& sets) {
-    std::vector<std::pair<double, double>> misfits;
-    double total = 0, sum = 0;
-    for (const Pixels& pixels : sets) {
-        if (pixels.size() < least_curved) continue;
-        misfits.emplace_back(sums_of(pixels).quadratic().rms, static_cast<double>(pixels.size()));
-        total += misfits.back().second;
-    }
-    std::sort(misfits.begin(), misfits.end());
-    for (const auto& [rms, weight] : misfits) {
-        sum += weight;
-        if (2 * sum < total) continue;
-        correlation_ = std::clamp(rms, 1.0, correlation_max);
-        return;
-    }
+double SurfaceImage::residual(const SurfaceSums& sums, const Surface& s) const {
+    const double x = sums.mean_x(), y = sums.mean_y(), rms = sums.rms(s);
+    const double mean_variance = sums.count() / sums.weight();
+    return rms * rms * mean_variance / variance(mean_variance, s.slope_x(x, y), s.slope_y(x, y));
 }
 
 SurfaceSums SurfaceImage::origin_of(const Pixels& pixels) const {
@@ -94,58 +84,13 @@ SurfaceSums SurfaceImage::sums_of(const Pixels& pixels) const {
     return sums;
 }
 
-Surface SurfaceImage::plane_of(const Pixels& pixels) const {
-    SurfaceSums sums = origin_of(pixels);
-    for (const int p : pixels) sums.add_to_plane(sample(p));
-    return sums.plane();
-}
-
 bool SurfaceImage::is_flat(const Surface& surface) const { return surface.rms <= flat * correlation_; }
 
 Surface SurfaceImage::surface_of(const SurfaceSums& sums) const {
     const Surface plane = sums.plane();
-    if (is_flat(plane) || sums.count() < static_cast<int>(least_curved)) return plane;
+    if (is_flat(plane) || sums.count() < least_curved) return plane;
     const Surface curved = sums.quadratic();
     return curved.rms < curved_gain * plane.rms ? curved : plane;
-}
-
-bool SurfaceImage::split_roof(const Pixels& pixels, const Surface& curved, Pixels& first, Pixels& second) const {
-    // The ridge runs along the direction of least curvature.
-    const double xx = curved.c[3], xy = curved.c[4] / 2, yy = curved.c[5];
-    const double mean = (xx + yy) / 2, root = std::hypot((xx - yy) / 2, xy);
-    const bool convex = std::abs(mean - root) > std::abs(mean + root);
-    const double across = 0.5 * std::atan2(2 * xy, xx - yy) + (convex ? pi / 2 : 0);
-    const double cx = std::cos(across), cy = std::sin(across);
-    first.clear(), second.clear();
-    for (const int p : pixels) {
-        const Sample s = sample(p);
-        ((s.x - curved.x0) * cx + (s.y - curved.y0) * cy < 0 ? first : second).push_back(p);
-    }
-    // The ridge itself may be rounded: neither fits nor the comparison count the pixels along it.
-    Pixels core_first = first, core_second = second, before_first, before_second;
-    double roof = 0, smooth = 0;
-    for (int round = 0; round < roof_rounds; ++round) {
-        if (core_first.size() < least_pixels || core_second.size() < least_pixels) return false;
-        const Surface a = plane_of(core_first), b = plane_of(core_second);
-        const double bend = std::hypot(a.c[1] - b.c[1], a.c[2] - b.c[2]);
-        core_first.swap(before_first), core_second.swap(before_second);
-        first.clear(), second.clear(), core_first.clear(), core_second.clear();
-        roof = smooth = 0;
-        for (const int p : pixels) {
-            const Sample s = sample(p);
-            const double fa = a.value(s.x, s.y), fb = b.value(s.x, s.y);
-            const bool in_first = convex ? fa <= fb : fa >= fb;
-            (in_first ? first : second).push_back(p);
-            if (std::abs(fa - fb) < rounding * bend) continue;
-            (in_first ? core_first : core_second).push_back(p);
-            const double r = s.ordinate - (in_first ? fa : fb), q = s.ordinate - curved.value(s.x, s.y);
-            roof += s.weight * r * r;
-            smooth += s.weight * q * q;
-        }
-        if (core_first == before_first && core_second == before_second) break;
-    }
-    return core_first.size() >= least_pixels && core_second.size() >= least_pixels &&
-           roof < roof_gain * roof_gain * smooth;
 }
 
 // Of a projective image, the plane q = a x + b y + c holds the points with a X + b Y + c Z = 1.
@@ -159,19 +104,20 @@ std::array<double, 3> SurfaceImage::normal(const Surface& s, double x, double y)
         const double px = m[0] * x + m[1] * y + m[2], py = m[3] * x + m[4] * y + m[5];
         c = offset_ + unit_ * s.value(x, y) - px * a - py * b;
     }
-    const double length = std::sqrt(a * a + b * b + c * c);
-    return {a / length, b / length, c / length};
+    return {a, b, c};
 }
 
-bool SurfaceImage::agree(int p, int q, const Surface& a, const Surface& b, double tolerance, double cosine) const {
+SurfaceImage::Continuation SurfaceImage::continuation(int p, int q, const Surface& a, const Surface& b) const {
     const Sample u = sample(p), v = sample(q);
     const double x = (u.x + v.x) / 2, y = (u.y + v.y) / 2;
     const double between = a.value(x, y) - b.value(x, y);
-    const double spread =
-        std::max(variance(at(p), a.slope_x(x, y), a.slope_y(x, y)), variance(at(p), b.slope_x(x, y), b.slope_y(x, y)));
-    if (between * between > tolerance * tolerance * spread) return false;
+    const double spread = std::max(variance(1 / u.weight, a.slope_x(x, y), a.slope_y(x, y)),
+                                   variance(1 / v.weight, b.slope_x(x, y), b.slope_y(x, y)));
+    const auto dot = [](const std::array<double, 3>& m, const std::array<double, 3>& n) {
+        return m[0] * n[0] + m[1] * n[1] + m[2] * n[2];
+    };
     const auto na = normal(a, x, y), nb = normal(b, x, y);
-    return na[0] * nb[0] + na[1] * nb[1] + na[2] * nb[2] >= cosine;
+    return {between * between / spread, dot(na, nb) / std::sqrt(dot(na, na) * dot(nb, nb))};
 }
 
 }  // namespace rangeedge

@@ -1,4 +1,4 @@
-// A range image in units of its noise, and which surface describes a set of its pixels.
+// A range image in units of its noise: how far pixels lie off surfaces, and where surfaces agree with each other.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
@@ -6,8 +6,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
+#include "base/array.hpp"
+#include "base/parallel.hpp"
 #include "image/noise.hpp"
 #include "regions/surface.hpp"
 
@@ -20,6 +23,7 @@ struct RangeMap {
     const float* y;         // null: the row
     const float* ordinate;  // grows toward the viewer, less `offset`; NaN: no data
     double offset;
+    double rounding;                 // of ordinates, before `offset` was taken away
     bool projective;                 // the ordinate is inverse depth, else height
     std::array<double, 6> to_plane;  // (x, y, 1) to normalised image coordinates, or to lengths
     Noise noise;                     // of lengths
@@ -29,14 +33,14 @@ struct RangeMap {
 using Pixels = std::vector<int>;
 
 constexpr double lateral_deviation = 0.15;  // pixels: by how much a sample may stem from beside its line of sight
-constexpr std::size_t least_pixels = 12;    // of a surface
-constexpr std::size_t least_curved = 40;    // of a quadratic
+constexpr int least_pixels = 12;            // of a surface
+constexpr int least_curved = 40;            // of a quadratic
 
 // Pixels are known by their index in a copy with a margin of one pixel, so that each has all its neighbours.
 class SurfaceImage {
 public:
     // `lateral` is the standard deviation of a pixel's place, in pixels.
-    SurfaceImage(const RangeMap& map, double lateral);
+    SurfaceImage(const RangeMap& map, double lateral, Team& team);
 
     int rows() const { return rows_; }
     int cols() const { return cols_; }
@@ -45,22 +49,29 @@ public:
     int index(int row, int col) const { return (row + 1) * stride() + col + 1; }
     std::array<int, 4> neighbours() const { return {-stride(), -1, 1, stride()}; }
 
-    bool valid(int p) const { return state_[static_cast<std::size_t>(p)] != none; }
-    bool open(int p) const { return state_[static_cast<std::size_t>(p)] == plain; }
-    bool edge(int p) const { return state_[static_cast<std::size_t>(p)] == edge_pixel; }
-    bool beside_edge(int p) const;
+    bool valid(int p) const { return state_[p] != none; }
+    bool open(int p) const { return state_[p] == plain; }
+    bool edge(int p) const { return state_[p] == edge_pixel; }
+    // Whether an edge runs between two neighbours, or along them a pixel away; not whether one runs across both.
+    bool edge_between(int p, int q) const {
+        const int step = q - p;
+        return edge(p - step) || edge(p) || edge(q) || edge(q + step);
+    }
 
-    // Noise correlated over several pixels moves surfaces more than its deviation between neighbours tells: the typical
-    // misfit of a quadratic to one of `sets` does. It scales every standard deviation from then on.
-    void estimate_correlation(const std::vector<Pixels>& sets);
-    void set_correlation(double correlation) { correlation_ = correlation; }
+    // The standard deviation of pixels from the surface of their region, in units of that between neighbours.
     double correlation() const { return correlation_; }
+    // Over how many pixels the noise is the same.
+    double correlation_area() const { return correlation_area_; }
+    void set_correlation(double correlation, double area) { correlation_ = correlation, correlation_area_ = area; }
 
     Sample sample(int p) const {
         const Pixel& s = at(p);
         return {static_cast<double>(s.x), static_cast<double>(s.y), static_cast<double>(s.ordinate),
                 1 / static_cast<double>(s.variance)};
     }
+
+    // Says that a pixel is going to be read: those along borders are scattered over memory.
+    void prefetch(int p) const { __builtin_prefetch(&at(p)); }
 
     // Square of the distance of a pixel from a surface in standard deviations: of the noise over a region, and of the
     // pixel's place.
@@ -69,22 +80,27 @@ public:
         const double x = static_cast<double>(pixel.x), y = static_cast<double>(pixel.y);
         if (!s.curved) {
             const double d = static_cast<double>(pixel.ordinate) - s.value_on_plane(x, y);
-            return d * d / variance(pixel, s.c[1], s.c[2]);
+            return d * d / variance(static_cast<double>(pixel.variance), s.c[1], s.c[2]);
         }
         const double d = static_cast<double>(pixel.ordinate) - s.value(x, y);
-        return d * d / variance(pixel, s.slope_x(x, y), s.slope_y(x, y));
+        return d * d / variance(static_cast<double>(pixel.variance), s.slope_x(x, y), s.slope_y(x, y));
     }
+    // The mean of the same over a set of pixels.
+    double residual(const SurfaceSums& sums, const Surface& s) const;
 
     SurfaceSums sums_of(const Pixels& pixels) const;
-    Surface plane_of(const Pixels& pixels) const;
+    // Sums of no pixels yet, counted from the middle of these.
+    SurfaceSums origin_of(const Pixels& pixels) const;
     // A plane unless a quadratic is much better.
     Surface surface_of(const SurfaceSums& sums) const;
     bool is_flat(const Surface& surface) const;
-    // Two planes that meet in a crease describe some sets of pixels better than a quadratic: whether so, and which
-    // pixels lie on which.
-    bool split_roof(const Pixels& pixels, const Surface& curved, Pixels& first, Pixels& second) const;
-    // Whether two surfaces agree between two neighbours, within some standard deviations and an angle.
-    bool agree(int p, int q, const Surface& a, const Surface& b, double tolerance, double cosine) const;
+
+    // How two surfaces go on into each other between two neighbouring pixels.
+    struct Continuation {
+        double gap;     // squared, in variances of a pixel
+        double cosine;  // of the angle between their normals
+    };
+    Continuation continuation(int p, int q, const Surface& a, const Surface& b) const;
 
 private:
     enum State : std::uint8_t { none, edge_pixel, plain };
@@ -93,19 +109,17 @@ private:
     };
 
     const Pixel& at(int p) const { return pixel_[static_cast<std::size_t>(p)]; }
-    double variance(const Pixel& p, double slope_x, double slope_y) const {
-        return correlation_ * correlation_ * static_cast<double>(p.variance) +
-               lateral_ * lateral_ * (slope_x * slope_x + slope_y * slope_y);
+    double variance(double variance, double slope_x, double slope_y) const {
+        return correlation_ * correlation_ * variance + lateral_ * lateral_ * (slope_x * slope_x + slope_y * slope_y);
     }
-    SurfaceSums origin_of(const Pixels& pixels) const;
     std::array<double, 3> normal(const Surface& s, double x, double y) const;
 
     int rows_, cols_;
     bool projective_;
-    double lateral_, offset_, unit_ = 1, correlation_ = 1;
+    double lateral_, offset_, unit_ = 1, correlation_ = 1, correlation_area_ = 1;
     std::array<double, 6> to_plane_;
-    std::vector<Pixel> pixel_;
-    std::vector<std::uint8_t> state_;
+    std::unique_ptr<Pixel[]> pixel_;
+    Array<std::uint8_t> state_;
 };
 
 }  // namespace rangeedge

@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "regions/patches.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "regions/roof.hpp"
+
+namespace rangeedge {
+namespace {
+
+constexpr int max_cuts = 4;              // of one set of pixels into planes
+constexpr double grown = 1.1;            // a patch that may have become a roof, in pixels it had when it was none
+constexpr double correlation_max = 8.0;  // noise over a region, in units of that between neighbours
+
+}  // namespace
+
+PatchMap::PatchMap(const RangeMap& map, Team& team)
+    : image_(map, lateral_deviation, team), tiles_(image_, team), team_(team), label_(image_.size(), 0),
+      free_(label_.size(), taken) {
+    parallel_for(image_.rows(), team_, [&](int first, int last, int) {
+        for (int p = image_.index(first, 0), end = image_.index(last, 0); p < end; ++p) release(p);
+    });
+    create({});
+    const TileNoise noise = tile_noise(tiles_);
+    image_.set_correlation(std::min(noise.deviation, correlation_max), noise.area);
+}
+
+void PatchMap::create(const Piece& piece) {
+    const int i = surfaces_.add();
+    regions_.add();
+    patches_.push_back({piece.sums, piece.surface, refit_after(piece.sums.count())});
+    for (const int p : piece.pixels) take(p, i);
+}
+
+void PatchMap::join_surfaces(int a, int b) {
+    Patch& joint = patch(a);
+    joint.sums = joint.sums.joined(patch(b).sums);
+    joint.surface = image_.surface_of(joint.sums);
+    surfaces_.link(b, a);
+}
+
+void PatchMap::flatten() {
+    Array<int> of(count());
+    for (int i = 0; i < count(); ++i) of[i] = surface(i);
+    parallel_for(label_.count(), team_, [&](int begin, int end, int) {
+        for (int p = begin; p < end; ++p) label_[p] = of[label_[p]];
+    });
+}
+
+void PatchMap::refit() {
+    for (Patch& p : patches_)
+        if (p.count()) p.surface = image_.surface_of(p.sums);
+}
+
+std::vector<SurfaceSums> PatchMap::sums_of(const std::vector<Pixels>& sets) const {
+    std::vector<SurfaceSums> sums(sets.size());
+    parallel_each(static_cast<int>(sets.size()), team_, [&](int i, int) {
+        const auto k = static_cast<std::size_t>(i);
+        sums[k] = image_.sums_of(sets[k]);
+    });
+    return sums;
+}
+
+void PatchMap::add_markers(const std::int32_t* markers) {
+    // Runs of equal markers, by marker.
+    struct Run {
+        std::int32_t marker;
+        int begin, end;
+    };
+    std::vector<Run> runs;
+    for (int row = 0; row < image_.rows(); ++row)
+        for (int col = 0; col < image_.cols();) {
+            const std::int32_t* const m = markers + row * image_.cols();
+            const std::int32_t marker = m[col];
+            const int begin = col;
+            while (col < image_.cols() && m[col] == marker) ++col;
+            if (marker > 0) runs.push_back({marker, image_.index(row, begin), image_.index(row, col)});
+        }
+    std::stable_sort(runs.begin(), runs.end(), [](const Run& a, const Run& b) { return a.marker < b.marker; });
+    std::vector<Pixels> sets;
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+        if (k == 0 || runs[k].marker != runs[k - 1].marker) sets.emplace_back();
+        for (int p = runs[k].begin; p < runs[k].end; ++p)
+            if (image_.open(p)) sets.back().push_back(p);
+    }
+    const std::vector<SurfaceSums> sums = sums_of(sets);
+    estimate_correlation(sums);
+    add_patches(sets, sums, HUGE_VAL);
+}
+
+bool PatchMap::add_patches(const std::vector<Pixels>& sets, double limit) {
+    return add_patches(sets, sums_of(sets), limit);
+}
+
+bool PatchMap::add_patches(const std::vector<Pixels>& sets, const std::vector<SurfaceSums>& sums, double limit) {
+    std::vector<std::vector<Piece>> pieces(sets.size());
+    parallel_each(static_cast<int>(sets.size()), team_, [&](int i, int) {
+        const auto k = static_cast<std::size_t>(i);
+        divide(sets[k], sums[k], 0, pieces[k]);
+    });
+    const int before = count();
+    for (const auto& of_set : pieces)
+        for (const Piece& piece : of_set)
+            if (image_.residual(piece.sums, piece.surface) < limit * limit) create(piece);
+    return count() > before;
+}
+
+void PatchMap::divide(const Pixels& pixels, const SurfaceSums& sums, int cuts, std::vector<Piece>& pieces) const {
+    if (sums.count() < least_pixels) return;
+    const Surface surface = image_.surface_of(sums);
+    Pixels first, second;
+    if (cuts < max_cuts && !image_.is_flat(surface) && split_roof(image_, pixels, sums.quadratic(), first, second)) {
+        divide(first, image_.sums_of(first), cuts + 1, pieces);
+        divide(second, image_.sums_of(second), cuts + 1, pieces);
+    } else {
+        pieces.push_back({pixels, sums, surface});
+    }
+}
+
+// Noise correlated over several pixels moves surfaces more than its deviation between neighbours tells. The noise of
+// tiles says how much at least, the typical misfit of a quadratic to one of the sets how much where sets are large.
+void PatchMap::estimate_correlation(const std::vector<SurfaceSums>& sums) {
+    std::vector<std::pair<double, int>> misfits;
+    double total = 0, sum = 0;
+    for (const SurfaceSums& s : sums)
+        if (s.count() >= least_curved) {
+            misfits.emplace_back(s.quadratic().rms, s.count());
+            total += s.count();
+        }
+    std::sort(misfits.begin(), misfits.end());
+    for (const auto& [rms, count] : misfits) {
+        sum += count;
+        if (2 * sum < total) continue;
+        image_.set_correlation(std::clamp(rms, image_.correlation(), correlation_max), image_.correlation_area());
+        return;
+    }
+}
+
+bool PatchMap::cut_roofs() {
+    // What has hardly grown since it was found to be no roof is none.
+    Array<int> number(count(), 0);  // among the patches to test, from 1
+    int candidates = 0;
+    for (int i = 1; i < count(); ++i) {
+        const Patch& p = patch(i);
+        if (p.surface.curved && p.count() >= least_curved && p.count() > grown * p.whole) number[i] = ++candidates;
+    }
+    if (!candidates) return false;
+    std::vector<Pixels> sets(static_cast<std::size_t>(candidates));
+    for_pixels([&](int p) {
+        if (const int k = number[label_[p]]) sets[static_cast<std::size_t>(k - 1)].push_back(p);
+    });
+    std::vector<std::vector<Piece>> pieces(sets.size());
+    Array<int> owner(sets.size());
+    for (int i = 1; i < count(); ++i)
+        if (number[i]) owner[number[i] - 1] = i;
+    parallel_each(candidates, team_, [&](int i, int) {
+        const auto k = static_cast<std::size_t>(i);
+        Pixels first, second;
+        if (!split_roof(image_, sets[k], patch(owner[i]).sums.quadratic(), first, second)) return;
+        divide(first, image_.sums_of(first), 1, pieces[k]);
+        divide(second, image_.sums_of(second), 1, pieces[k]);
+    });
+    bool any = false;
+    for (int i = 0; i < candidates; ++i) {
+        const auto k = static_cast<std::size_t>(i);
+        Patch& p = patch(owner[i]);
+        p.whole = p.count();
+        if (pieces[k].empty()) continue;
+        any = true;
+        for (const int pixel : sets[k]) release(pixel);
+        p.sums = SurfaceSums();
+        for (const Piece& piece : pieces[k]) create(piece);
+    }
+    return any;
+}
+
+}  // namespace rangeedge

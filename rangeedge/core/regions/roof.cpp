@@ -1,0 +1,84 @@
+// The ridge of a roof runs along the direction in which the quadratic bends least. It parts the pixels in two; a plane
+// is fitted to either side, each pixel goes to the plane that lies on the outside of a valley or the inside of a ridge
+// there, and so on until nothing changes. A few thousand pixels tell this as well as all of a large surface do.
+// SPDX-License-Identifier: Apache-2.0
+#include "regions/roof.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace rangeedge {
+namespace {
+
+constexpr double roof_gain = 0.97;  // two planes must lower the rms of the quadratic to this share
+constexpr double chance_gain = 4;   // by chance
+constexpr int roof_rounds = 8;
+constexpr double rounded = 2.5;  // pixels on either side of a ridge that may be rounded
+constexpr std::size_t most_samples = 2048;
+const double pi = std::acos(-1.0);
+
+Surface plane_of(const std::vector<Sample>& samples) {
+    if (samples.empty()) return {};
+    SurfaceSums sums(samples.front().x, samples.front().y, samples.front().ordinate);
+    for (const Sample& s : samples) sums.add_to_plane(s);
+    return sums.plane();
+}
+
+struct Roof {
+    Surface first, second;
+    bool convex;
+
+    bool in_first(double on_first, double on_second) const {
+        return convex ? on_first <= on_second : on_first >= on_second;
+    }
+};
+
+}  // namespace
+
+bool split_roof(const SurfaceImage& image, const Pixels& pixels, const Surface& curved, Pixels& first, Pixels& second) {
+    std::vector<Sample> samples;
+    const std::size_t step = pixels.size() / most_samples + 1;
+    for (std::size_t k = 0; k < pixels.size(); k += step) samples.push_back(image.sample(pixels[k]));
+
+    const double xx = curved.c[3], xy = curved.c[4] / 2, yy = curved.c[5];
+    const double mean = (xx + yy) / 2, root = std::hypot((xx - yy) / 2, xy);
+    Roof roof{{}, {}, std::abs(mean - root) > std::abs(mean + root)};
+    const double across = 0.5 * std::atan2(2 * xy, xx - yy) + (roof.convex ? pi / 2 : 0);
+    const double cx = std::cos(across), cy = std::sin(across);
+    // The ridge itself may be rounded: neither fits nor the comparison count the pixels along it.
+    std::vector<Sample> side_a, side_b;
+    for (const Sample& s : samples)
+        ((s.x - curved.x0) * cx + (s.y - curved.y0) * cy < 0 ? side_a : side_b).push_back(s);
+    const std::size_t least = std::max<std::size_t>(static_cast<std::size_t>(least_pixels) / step, 4);
+    double of_roof = 0, of_curved = 0;
+    for (int round = 0; round < roof_rounds; ++round) {
+        if (side_a.size() < least || side_b.size() < least) return false;
+        roof.first = plane_of(side_a), roof.second = plane_of(side_b);
+        const double bend = std::hypot(roof.first.c[1] - roof.second.c[1], roof.first.c[2] - roof.second.c[2]);
+        const std::size_t before = side_a.size();
+        side_a.clear(), side_b.clear();
+        of_roof = of_curved = 0;
+        for (const Sample& s : samples) {
+            const double a = roof.first.value_on_plane(s.x, s.y), b = roof.second.value_on_plane(s.x, s.y);
+            if (std::abs(a - b) < rounded * bend) continue;
+            const bool on_a = roof.in_first(a, b);
+            (on_a ? side_a : side_b).push_back(s);
+            const double r = s.ordinate - (on_a ? a : b), q = s.ordinate - curved.value(s.x, s.y);
+            of_roof += s.weight * r * r, of_curved += s.weight * q * q;
+        }
+        if (round && side_a.size() == before) break;
+    }
+    const double chance = chance_gain * image.correlation_area() / static_cast<double>(pixels.size());
+    const double gain = std::max(1 - roof_gain * roof_gain, chance);
+    if (side_a.size() < least || side_b.size() < least || of_roof >= (1 - gain) * of_curved) return false;
+    first.clear(), second.clear();
+    for (const int p : pixels) {
+        const Sample s = image.sample(p);
+        const bool on_a = roof.in_first(roof.first.value_on_plane(s.x, s.y), roof.second.value_on_plane(s.x, s.y));
+        (on_a ? first : second).push_back(p);
+    }
+    return true;
+}
+
+}  // namespace rangeedge
