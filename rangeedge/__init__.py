@@ -46,6 +46,7 @@ from .io import RangeImage, imreadRange, imwriteRange
 from .noise import estimateNoise
 from .noise_model import NoiseModel
 from .options import ScanLineParams
+from .projection import backproject, project
 from .regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
 from .seeds import extractSeeds, extractSeedsWithStats
 from .selection import overallStrength, selectEdges, strengthImage
@@ -65,6 +66,8 @@ __all__ = [  # noqa: RUF022
     "RangeImage",
     "imreadRange",
     "imwriteRange",
+    "backproject",
+    "project",
     "NoiseModel",
     "estimateNoise",
     "ScanLineParams",

@@ -20,7 +20,7 @@ import rangeedge
 from rangeedge import _core
 
 PUBLIC = """
-    error RangeImage imreadRange imwriteRange NoiseModel estimateNoise ScanLineParams splitScanLine
+    error RangeImage imreadRange imwriteRange backproject project NoiseModel estimateNoise ScanLineParams splitScanLine
     EdgeStrength edgeStrength edgePoints kindNames flyingPixels strengthImage overallStrength selectEdges thinEdges detectEdges
     detectEdgesWithStrength
     ScanLineDetector createScanLineDetector closeContours
