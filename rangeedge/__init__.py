@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ._check import error
+from .chains import EdgeChain, EdgeChains, linkEdges
 from .closure import closeContours
 from .constants import (
     CREASE_MAX,
@@ -85,6 +86,9 @@ __all__ = [  # noqa: RUF022
     "detectEdgesWithStrength",
     "ScanLineDetector",
     "createScanLineDetector",
+    "EdgeChain",
+    "EdgeChains",
+    "linkEdges",
     "closeContours",
     "distanceTransform",
     "distanceTransformWithLabels",
