@@ -180,21 +180,24 @@ private:
         return closed_ ? arm : static_cast<int>(std::min<std::ptrdiff_t>(arm, size() - 1 - i));
     }
 
+    // 1 less the cosine of the angle by which chords turn.
     double chord_turn(std::ptrdiff_t i, int arm) const {
         const Point &a = at(i - before(i, arm)), &b = at(i), &c = at(i + after(i, arm));
         const double ux = b.x - a.x, uy = b.y - a.y, vx = c.x - b.x, vy = c.y - b.y;
-        return std::atan2(std::abs(ux * vy - uy * vx), ux * vx + uy * vy) * degrees_per_radian;
+        const double squares = (ux * ux + uy * uy) * (vx * vx + vy * vy);
+        return squares > 0 ? 1 - (ux * vx + uy * vy) / std::sqrt(squares) : 0;
     }
 
     void look(int arm) {
         const std::ptrdiff_t first = closed_ ? 0 : least_arm, end = closed_ ? size() : size() - least_arm;
         if (end <= first || size() < 2 * arm + 2) return;
+        const double least = 1 - std::cos(least_angle_ / 2 / degrees_per_radian);
         turns_.assign(size(), 0);
         for (std::ptrdiff_t i = first; i < end; ++i) turns_[i] = chord_turn(i, arm);
         for (std::ptrdiff_t i = first; i < end; ++i) {
-            if (turns_[i] < least_angle_ / 2) continue;
+            if (turns_[i] < least) continue;
             bool largest = true;
-            for (int k = 1; k <= arm / 2; ++k) {
+            for (int k = 1; largest && k <= arm / 2; ++k) {
                 const std::ptrdiff_t left = (i - k + size()) % size(), right = (i + k) % size();
                 largest &= turns_[left] < turns_[i] && turns_[right] <= turns_[i];
             }
@@ -260,10 +263,16 @@ void cut(Piece& chain, const std::vector<Candidate>& candidates, const Crossings
 }  // namespace
 
 std::vector<Piece> cut_at_corners(std::vector<Piece> chains, const std::vector<Candidate>& candidates,
-                                  const Crossings& crossings, double least_angle) {
-    std::vector<Piece> parts;
-    for (Piece& chain : chains) cut(chain, candidates, crossings, least_angle, parts);
-    return parts;
+                                  const Crossings& crossings, double least_angle, Team& team) {
+    std::vector<std::vector<Piece>> parts(chains.size());
+    parallel_each(static_cast<int>(chains.size()), team, [&](int i, int) {
+        const auto k = static_cast<std::size_t>(i);
+        cut(chains[k], candidates, crossings, least_angle, parts[k]);
+    });
+    chains.clear();
+    for (std::vector<Piece>& of_one : parts)
+        for (Piece& part : of_one) chains.push_back(std::move(part));
+    return chains;
 }
 
 }  // namespace rangeedge

@@ -8,12 +8,13 @@
 #pragma once
 #include <vector>
 
+#include "base/parallel.hpp"
 #include "chains/pieces.hpp"
 
 namespace rangeedge {
 
 // Parts between corners at which a chain turns by `least_angle` degrees or more.
 std::vector<Piece> cut_at_corners(std::vector<Piece> chains, const std::vector<Candidate>& candidates,
-                                  const Crossings& crossings, double least_angle);
+                                  const Crossings& crossings, double least_angle, Team& team);
 
 }  // namespace rangeedge

@@ -28,7 +28,7 @@ struct PointSums {
     // The weighted sum of squared distances from the best line.
     double rss() const {
         const double a = xx - x * x / w, b = xy - x * y / w, c = yy - y * y / w;
-        return std::max((a + c) / 2 - std::hypot((a - c) / 2, b), 0.0);
+        return std::max((a + c - std::sqrt((a - c) * (a - c) + 4 * b * b)) / 2, 0.0);
     }
 
     // In the direction that has a positive product with (forward_x, forward_y).

@@ -29,13 +29,13 @@ LinkedEdges link_edges(const Frame<T>& frame, const std::vector<Candidate>& cand
     const Crossings crossings = assign_candidates(candidates, tracing, frame.rows, frame.cols);
     std::vector<Piece> chains = join_pieces(find_pieces(candidates, tracing, crossings, kinds, frame.cols), candidates,
                                             crossings, {options.bridge, largest_turn});
-    chains = cut_at_corners(std::move(chains), candidates, crossings, options.corner_angle);
+    Team team(std::min(threads, 1 + static_cast<int>(chains.size()) / chains_per_thread));
+    chains = cut_at_corners(std::move(chains), candidates, crossings, options.corner_angle, team);
     chains.erase(std::remove_if(chains.begin(), chains.end(),
                                 [&](const Piece& c) { return c.members.size() < options.min_length; }),
                  chains.end());
 
     std::vector<SmoothChain> smooth(chains.size());
-    Team team(std::min(threads, 1 + static_cast<int>(chains.size()) / chains_per_thread));
     parallel_each(static_cast<int>(chains.size()), team, [&](int i, int) {
         const auto k = static_cast<std::size_t>(i);
         smooth[k] = smooth_chain(chains[k], frame, candidates, crossings);

@@ -20,7 +20,7 @@ constexpr int end_places = 4;
 constexpr double largest_precision = 1e30;           // of a slope
 constexpr int position_reach = 12, least_reach = 4;  // pixels on either side of a parabola
 constexpr int normal_reach = 10;                     // pixels on either side that tell a normal
-constexpr int gradient_rounds = 3;
+constexpr int gradient_rounds = 2;
 constexpr int tangent_reach = 3;  // pixels
 constexpr double reach_per_radius = 0.5;
 constexpr std::ptrdiff_t most_frayed = 6, fray_reach = 16;  // positions at an end, and inside of them
@@ -60,7 +60,7 @@ public:
         find_plane();
         for (const int side : {0, 1}) find_ordinates(side);
         // The ordinates are those half a pixel aside, until the gradient is known.
-        for (int round = 0; jumps_ && round < gradient_rounds; ++round) {
+        for (int round = 0; jumps_ && result_.straight && round < gradient_rounds; ++round) {
             for (const int side : {0, 1}) find_gradients(side);
             gradients_known_ = true;
             for (const int side : {0, 1}) find_ordinates(side);
@@ -199,7 +199,8 @@ private:
             const Point &a = means_[neighbour(k, -position_reach)], &b = means_[k],
                         &c = means_[neighbour(k, position_reach)];
             const double cross = (b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x);
-            const double product = std::hypot(b.x - a.x, b.y - a.y) * std::hypot(c.x - b.x, c.y - b.y);
+            const double product = std::sqrt(((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y)) *
+                                             ((c.x - b.x) * (c.x - b.x) + (c.y - b.y) * (c.y - b.y)));
             if (product > 0) turn = std::max(turn, std::abs(cross) / product);
         }
         const double radius = position_reach / std::max(turn, 1e-3);
@@ -322,22 +323,23 @@ private:
             const SlopeSums one{p * x * x, p * x * y, p * y * y, p * x * m, p * y * m};
             sums[s.place].add(one), all.add(one);
         }
-        const bool whole = result_.straight && affine_[side];
+        if (result_.straight && affine_[side]) {
+            set_gradient(0, side, all, 0, places() - 1);
+            for (std::ptrdiff_t k = 1; k < places(); ++k)
+                std::copy_n(point(0).gradient[side], 2, point(k).gradient[side]);
+            return;
+        }
+        const auto reach = static_cast<int>(std::min<std::ptrdiff_t>(normal_reach, (places() - 1) / 2));
         for (std::ptrdiff_t k = 0; k < places(); ++k) {
-            SlopeSums near = all;
-            if (!whole) {
-                near = {};
-                const int reach = static_cast<int>(std::min<std::ptrdiff_t>(normal_reach, (places() - 1) / 2));
-                for (int j = -reach; j <= reach; ++j)
-                    if (chain_.closed || (k + j >= 0 && k + j < places())) near.add(sums[neighbour(k, j)]);
-            }
-            set_gradient(k, side, near, whole);
+            SlopeSums near;
+            for (int j = -reach; j <= reach; ++j)
+                if (chain_.closed || (k + j >= 0 && k + j < places())) near.add(sums[neighbour(k, j)]);
+            set_gradient(k, side, near, neighbour(k, -tangent_reach), neighbour(k, tangent_reach));
         }
     }
 
-    void set_gradient(std::ptrdiff_t k, int side, const SlopeSums& sums, bool whole) {
-        const std::ptrdiff_t first = whole ? 0 : neighbour(k, -tangent_reach);
-        const std::ptrdiff_t last = whole ? places() - 1 : neighbour(k, tangent_reach);
+    // From what the slopes tell across the way from one place to another, and the ordinates along it.
+    void set_gradient(std::ptrdiff_t k, int side, const SlopeSums& sums, std::ptrdiff_t first, std::ptrdiff_t last) {
         const ChainPoint &a = point(first), &b = point(last);
         double tx = b.plane[0] - a.plane[0], ty = b.plane[1] - a.plane[1];
         const double length = std::hypot(tx, ty), along = (b.ordinate[side] - a.ordinate[side]) / length;
