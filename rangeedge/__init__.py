@@ -50,6 +50,7 @@ from .options import ScanLineParams
 from .projection import backproject, project
 from .regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
 from .seeds import extractSeeds, extractSeedsWithStats
+from .segments import Segments, fitSegments
 from .selection import overallStrength, selectEdges, strengthImage
 from .thinning import thinEdges
 
@@ -89,6 +90,8 @@ __all__ = [  # noqa: RUF022
     "EdgeChain",
     "EdgeChains",
     "linkEdges",
+    "Segments",
+    "fitSegments",
     "closeContours",
     "distanceTransform",
     "distanceTransformWithLabels",

@@ -32,6 +32,7 @@ POINT = np.dtype(
         ("jump", "f8"),
         ("crease", "f8"),
         ("significance", "f8"),
+        ("measured", "3f8"),
     ]
 )
 CHAIN = np.dtype(
@@ -59,7 +60,8 @@ class EdgeChain:
         x, y (pixels, subpixel); point, its coordinates in space, of a jump on the nearer surface, and behind, those on
         the surface behind (NaN of a crease); normals (2, 3), unit vectors toward the viewer of the surface on the left
         and of that on the right of the chain, of a jump the nearer one and that behind, NaN where unknown; jump (length
-        along the viewing axis, 0 of a crease); crease (degrees, 0 of a jump); significance.
+        along the viewing axis, 0 of a crease); crease (degrees, 0 of a jump); significance; and measured, where the
+        point would be by the scan lines that cross the edge there alone, without the averaging along the chain.
     kind : int
         EDGE_JUMP, EDGE_CONVEX or EDGE_CONCAVE. Along a jump the nearer surface is on the left, seen in the image.
     closed, straight : bool
@@ -216,11 +218,9 @@ def _points(frame: Frame, rows: np.ndarray, jumps: np.ndarray) -> np.ndarray:
     points["x"], points["y"] = rows[:, 0], rows[:, 1]
     plane, ordinates, gradients = rows[:, 2:4], rows[:, 4:6], rows[:, 6:10].reshape(-1, 2, 2)
     axes = frame.axes
-    for side, name in enumerate(("point", "behind")):
-        with np.errstate(divide="ignore", invalid="ignore"):
-            depth = 1 / ordinates[:, side] if frame.projective else -ordinates[:, side]
-        place = plane * depth[:, None] if frame.projective else plane
-        points[name] = np.column_stack([place, depth]) @ axes
+    points["point"] = _in_space(frame, plane, ordinates[:, 0])
+    points["behind"] = _in_space(frame, plane, ordinates[:, 1])
+    points["measured"] = _in_space(frame, rows[:, 11:13], rows[:, 13])
     points["jump"] = np.where(jumps, np.abs((points["behind"] - points["point"]) @ axes[2]), 0)
     points["behind"][~jumps] = np.nan
     points["normals"] = _normals(frame, plane, ordinates, gradients) @ axes
@@ -229,6 +229,12 @@ def _points(frame: Frame, rows: np.ndarray, jumps: np.ndarray) -> np.ndarray:
     points["crease"] = np.where(jumps, 0, np.degrees(2 * np.arctan2(*apart)))
     points["significance"] = rows[:, 10]
     return points
+
+
+def _in_space(frame: Frame, plane: np.ndarray, ordinate: np.ndarray) -> np.ndarray:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depth = 1 / ordinate if frame.projective else -ordinate
+    return np.column_stack([plane * depth[:, None] if frame.projective else plane, depth]) @ frame.axes
 
 
 def _normals(frame: Frame, plane: np.ndarray, ordinates: np.ndarray, gradients: np.ndarray) -> np.ndarray:

@@ -23,7 +23,8 @@ PUBLIC = """
     error RangeImage imreadRange imwriteRange backproject project NoiseModel estimateNoise ScanLineParams splitScanLine
     EdgeStrength edgeStrength edgePoints kindNames flyingPixels strengthImage overallStrength selectEdges thinEdges detectEdges
     detectEdgesWithStrength
-    ScanLineDetector createScanLineDetector EdgeChain EdgeChains linkEdges closeContours
+    ScanLineDetector createScanLineDetector EdgeChain EdgeChains linkEdges
+    Segments fitSegments closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
     extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats
     drawEdges drawRegions colorizeDistance drawOverview

@@ -31,6 +31,7 @@ struct ChainPoint {
     double ordinate[2];     // of the surface to the left and to the right; of a jump the left one is nearer
     double gradient[2][2];  // of their ordinates over the plane of the image; NaN where unknown
     double significance;
+    double measured[3];  // before smoothing: in the plane of the image, and the ordinate of the nearer surface
 };
 
 struct ChainHeader {

@@ -69,6 +69,7 @@ public:
             for (ChainPoint& p : result_.points)
                 p.ordinate[0] = p.ordinate[1] = (p.ordinate[0] + p.ordinate[1]) / 2;  // the surfaces meet
         for (const int side : {0, 1}) find_gradients(side);
+        find_measured();
         find_significance();
         if (result_.straight) sort_along();
         return std::move(result_);
@@ -347,6 +348,24 @@ private:
         const double across = sums.across(-ty, tx, tx, ty, along);
         double* gradient = point(k).gradient[side];
         gradient[0] = along * tx - across * ty, gradient[1] = along * ty + across * tx;
+    }
+
+    // What the candidates of each place say by themselves.
+    void find_measured() {
+        Array<int> counts(places(), 0);
+        for (ChainPoint& p : result_.points) std::fill_n(p.measured, 3, 0.0);
+        for (const Sample& s : samples_) {
+            const double value = jumps_ ? ordinate(s, 0) : (ordinate(s, 0) + ordinate(s, 1)) / 2;
+            if (!std::isfinite(value)) continue;
+            ChainPoint& p = point(s.place);
+            for (const int axis : {0, 1}) p.measured[axis] += static_cast<double>(s.candidate->plane_position[axis]);
+            p.measured[2] += value, ++counts[s.place];
+        }
+        for (std::ptrdiff_t k = 0; k < places(); ++k) {
+            ChainPoint& p = point(k);
+            for (double& v : p.measured) v = counts[k] ? v / counts[k] : nan;
+            if (!frame_.points && counts[k]) to_plane(means_[k].x, means_[k].y, p.measured);
+        }
     }
 
     void find_significance() {
