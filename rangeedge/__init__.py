@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ._check import error
+from .chains import EdgeChain, EdgeChains, linkEdges
 from .closure import closeContours
 from .constants import (
     CREASE_MAX,
@@ -46,8 +47,10 @@ from .io import RangeImage, imreadRange, imwriteRange
 from .noise import estimateNoise
 from .noise_model import NoiseModel
 from .options import ScanLineParams
+from .projection import backproject, project
 from .regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
 from .seeds import extractSeeds, extractSeedsWithStats
+from .segments import Segments, fitSegments
 from .selection import overallStrength, selectEdges, strengthImage
 from .thinning import thinEdges
 
@@ -65,6 +68,8 @@ __all__ = [  # noqa: RUF022
     "RangeImage",
     "imreadRange",
     "imwriteRange",
+    "backproject",
+    "project",
     "NoiseModel",
     "estimateNoise",
     "ScanLineParams",
@@ -82,6 +87,11 @@ __all__ = [  # noqa: RUF022
     "detectEdgesWithStrength",
     "ScanLineDetector",
     "createScanLineDetector",
+    "EdgeChain",
+    "EdgeChains",
+    "linkEdges",
+    "Segments",
+    "fitSegments",
     "closeContours",
     "distanceTransform",
     "distanceTransformWithLabels",

@@ -89,7 +89,16 @@ class ClosingOptions(TypedDict, total=False):
     minArea: int
 
 
+class JoiningOptions(TypedDict, total=False):
+    bridge: float
+    cornerAngle: float
+
+
 class DetectionOptions(ScanLineOptions, RefinementOptions, total=False):
+    pass
+
+
+class LinkingOptions(DetectionOptions, JoiningOptions, total=False):
     pass
 
 

@@ -273,7 +273,7 @@ def edgePoints(
 
 def measure_strength(frame: Frame, params: ScanLineParams) -> EdgeStrength:
     """Edge strengths of a checked range image."""
-    strength = _no_strength(frame.shape)
+    strength = no_strength(frame.shape)
     _core.edge_strength(frame.kernel, kernel_options(frame, params), frame.threads, *strength)
     return strength
 
@@ -285,7 +285,7 @@ def measure_points(frame: Frame, params: ScanLineParams) -> np.ndarray:
 
 def measure_both(frame: Frame, params: ScanLineParams) -> tuple[EdgeStrength, np.ndarray]:
     """Edge strengths and edge points of a checked range image, of one approximation of its scan lines."""
-    strength = _no_strength(frame.shape)
+    strength = no_strength(frame.shape)
     found = _core.edge_strength_and_candidates(frame.kernel, kernel_options(frame, params), frame.threads, *strength)
     return strength, _points(found)
 
@@ -297,7 +297,7 @@ def _points(candidates: dict[str, np.ndarray]) -> np.ndarray:
     return points
 
 
-def _no_strength(shape: tuple[int, int]) -> EdgeStrength:
+def no_strength(shape: tuple[int, int]) -> EdgeStrength:
     """All zero. Three maps of floats and one of bytes share an allocation: new memory takes the system a while."""
     size = shape[0] * shape[1]
     maps = np.zeros(13 * size, np.uint8)

@@ -96,6 +96,20 @@ class Frame:
             return -np.asarray(self.axis)
         return np.array([0.0, 0.0, 1.0 if self.heightMap else -1.0])
 
+    @property
+    def axes(self) -> np.ndarray:
+        """(3, 3): directions of x and y on the plane of the image and of the depth, as rows, in which points are given.
+
+        As scan lines of points have them: x lies along that of the points as far as the direction of view lets it.
+        """
+        if self.samples.ndim == 2:
+            return np.diag([1.0, 1.0, -1.0 if self.heightMap else 1.0])
+        axis = np.asarray(self.axis)
+        right = np.array([1.0, 0.0, 0.0]) - axis[0] * axis
+        length = np.linalg.norm(right)
+        right = right / length if length > 0 else np.array([0.0, 1.0, 0.0])
+        return np.stack([right, np.cross(axis, right), axis])
+
     def with_noise(self, noise: NoiseModel | float | np.ndarray) -> Frame:
         """The same image with its noise, which must be positive at every valid pixel."""
         if isinstance(noise, np.ndarray):

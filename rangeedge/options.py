@@ -419,6 +419,30 @@ class Closing(Options):
     )
 
 
+@declared
+@dataclass(frozen=True, eq=False, repr=False)
+class Linking(Options):
+    """How edge points are joined into chains."""
+
+    bridge: float = option(
+        6.0,
+        _real(0),
+        "float",
+        "Widest gap of a line that is bridged where kind and direction agree on its two sides: a hole, or a junction"
+        " through which an edge runs on; 0 bridges none.",
+        unit="pixels",
+        group="chains",
+    )
+    cornerAngle: float = option(
+        8.0,
+        _real(0, 180, above=True),
+        "float",
+        "A chain ends at a corner, where it turns abruptly by more; 180 follows outlines around corners.",
+        unit="degrees",
+        group="chains",
+    )
+
+
 def _of(kind: type[Options], *groups: str) -> dict[str, Option]:
     return {name: own for name, own in kind.options.items() if own.group in groups}
 
@@ -432,4 +456,5 @@ DETECTION = {**SCAN_LINES, **SELECTION}
 SEEDING = Seeding.options
 GROWING = {**MEASURED, **_of(Growing, "regions")}
 SEGMENTING = {**MEASURED, **Growing.options}
+LINKING = {**DETECTION, **Linking.options}
 CLOSING = {**MEASURED, **Closing.options}

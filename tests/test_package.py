@@ -20,10 +20,11 @@ import rangeedge
 from rangeedge import _core
 
 PUBLIC = """
-    error RangeImage imreadRange imwriteRange NoiseModel estimateNoise ScanLineParams splitScanLine
+    error RangeImage imreadRange imwriteRange backproject project NoiseModel estimateNoise ScanLineParams splitScanLine
     EdgeStrength edgeStrength edgePoints kindNames flyingPixels strengthImage overallStrength selectEdges thinEdges
     detectEdges detectEdgesWithStrength
-    ScanLineDetector createScanLineDetector closeContours
+    ScanLineDetector createScanLineDetector EdgeChain EdgeChains linkEdges
+    Segments fitSegments closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
     extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats
     drawEdges drawRegions colorizeDistance drawOverview

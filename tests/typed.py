@@ -19,6 +19,7 @@ KEYWORDS = {
     "Growing": options.GROWING,
     "Segmenting": options.SEGMENTING,
     "Closing": options.CLOSING,
+    "Joining": options.Linking.options,
 }
 HEAD = '''"""The options as editors and type checkers know them, by ``python tests/typed.py`` from `options.py`."""
 
@@ -42,7 +43,7 @@ if TYPE_CHECKING:
 def text() -> str:
     """What the file should hold."""
     keywords = "\n\n".join(typed_dict(name, group) for name, group in KEYWORDS.items())
-    return f"{HEAD}{keywords}\n\n{DETECTION_CLASS}\n\n{accessors()}"
+    return f"{HEAD}{keywords}\n\n{DETECTION_CLASS}\n\n{LINKING_CLASS}\n\n{accessors()}"
 
 
 def typed_dict(name: str, group: dict[str, Option]) -> str:
@@ -51,6 +52,7 @@ def typed_dict(name: str, group: dict[str, Option]) -> str:
 
 
 DETECTION_CLASS = "class DetectionOptions(ScanLineOptions, RefinementOptions, total=False):\n    pass\n"
+LINKING_CLASS = "class LinkingOptions(DetectionOptions, JoiningOptions, total=False):\n    pass\n"
 
 
 def accessors() -> str:

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "chains/channel.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace rangeedge {
+namespace {
+
+constexpr int rounds = 3;
+constexpr double farthest = 3;  // root mean squares that a sample may lie off to be used in the next round
+constexpr double part_deviations = 4;
+constexpr double least_share = 0.5;          // of the samples of a part, that lie on the line
+constexpr std::ptrdiff_t least_series = 10;  // parts, of whose order one can tell anything
+constexpr double least_roughness = 0.5;      // of residuals in no order: 2, von Neumann's ratio
+constexpr double most_share = 1.6;  // of half a distance of pixels, that a line may lead off to be moved between them
+constexpr double damping = 0.25;
+constexpr int power_rounds = 60;
+constexpr int part_samples = 24, most_parts = 24;
+
+// One pass of least squares over the samples not farther than `most` off the last fit.
+AffineFit weighted_fit(const Array<ChannelSample>& samples, const AffineFit& last, double most, double& rms) {
+    double w = 0, t = 0, v = 0;
+    const auto used = [&](const ChannelSample& s) { return std::abs(s.value - last.at(s.position)) <= most; };
+    for (const ChannelSample& s : samples)
+        if (used(s)) w += s.weight, t += s.weight * s.position, v += s.weight * s.value;
+    if (!(w > 0)) return last;
+    AffineFit fit{t / w, v / w, 0, false};
+    double tt = 0, tv = 0, vv = 0;
+    for (const ChannelSample& s : samples) {
+        if (!used(s)) continue;
+        const double dt = s.position - fit.centre, dv = s.value - fit.value;
+        tt += s.weight * dt * dt, tv += s.weight * dt * dv, vv += s.weight * dv * dv;
+    }
+    if (tt > 0) fit.slope = tv / tt;
+    rms = std::sqrt(std::max(vv - fit.slope * tv, 0.0) / w);
+    return fit;
+}
+
+// Whether the mean residual of every part is as small as the scatter in the parts lets one expect, or if the noise goes
+// beyond parts, at least no bend: the residuals of neighbouring parts are hardly more alike than those of others.
+bool all_parts_fit(const Array<ChannelSample>& samples, const AffineFit& fit, double most, double allowed) {
+    const std::ptrdiff_t n = samples.size();
+    const std::ptrdiff_t parts = std::min<std::ptrdiff_t>(std::max<std::ptrdiff_t>(n / part_samples, 2), most_parts);
+    Array<double> means(parts, 0), weights(parts, 0);
+    double within = 0, total = 0;
+    for (std::ptrdiff_t i = 0; i < parts; ++i) {
+        double w = 0, r = 0, rr = 0, whole = 0;
+        for (std::ptrdiff_t k = n * i / parts; k < n * (i + 1) / parts; ++k) {
+            const ChannelSample& s = samples[k];
+            const double residual = s.value - fit.at(s.position);
+            whole += s.weight;
+            if (std::abs(residual) > most) continue;
+            w += s.weight, r += s.weight * residual, rr += s.weight * residual * residual;
+        }
+        if (!(w > least_share * whole)) return false;
+        means[i] = r / w, weights[i] = w;
+        within += rr - r * r / w, total += w;
+    }
+    const double mean_weight = total / static_cast<double>(n), variance = std::max(within, 0.0) / total;
+    bool small = true;
+    double squares = 0, differences = 0;
+    for (std::ptrdiff_t i = 0; i < parts; ++i) {
+        small &= std::abs(means[i]) <= allowed + part_deviations * std::sqrt(variance * mean_weight / weights[i]);
+        squares += means[i] * means[i];
+        if (i > 0) differences += (means[i] - means[i - 1]) * (means[i] - means[i - 1]);
+    }
+    return small || (parts >= least_series && differences > least_roughness * squares);
+}
+
+// The value at 0 of the parabola with these moments of t^0..t^4 and of v t^0..t^2, a line or constant where too few.
+double parabola_at(double x, const double s[5], const double r[3], int places) {
+    if (!(s[0] > 0)) return std::numeric_limits<double>::quiet_NaN();
+    const double m = s[1] / s[0], n1 = s[2] - m * s[1];
+    double value = r[0] / s[0];
+    if (places < 2 || !(n1 > 0)) return value;
+    value += (r[1] - m * r[0]) / n1 * (x - m);
+    const double a = (s[3] - m * s[2]) / n1, b = s[2] / s[0] - a * m, n2 = s[4] - a * s[3] - b * s[2];
+    if (places < 5 || !(n2 > 0)) return value;
+    return value + (r[2] - a * r[1] - b * r[0]) / n2 * (x * x - a * x - b);
+}
+
+}  // namespace
+
+AffineFit fit_affine(const Array<ChannelSample>& samples, double allowed) {
+    double rms = 0, most = HUGE_VAL;
+    AffineFit fit{};
+    for (int round = 0; round < rounds; ++round) {
+        fit = weighted_fit(samples, fit, most, rms);
+        most = std::max(farthest * rms, allowed);
+    }
+    fit.fits = all_parts_fit(samples, fit, most, allowed);
+    return fit;
+}
+
+void pass_between(const Array<ChannelSample>& samples, const Array<double>& halves, AffineFit& fit) {
+    const auto largest_share = [&](const AffineFit& f) {
+        double largest = 0;
+        for (std::ptrdiff_t i = 0; i < samples.size(); ++i)
+            if (halves[i] > 0)
+                largest = std::max(largest, std::abs(samples[i].value - f.at(samples[i].position)) / halves[i]);
+        return largest;
+    };
+    double share = largest_share(fit);
+    if (share > most_share) return;
+    AffineFit next = fit;
+    for (int round = 0; round < power_rounds; ++round) {
+        double w = 0, t = 0, tt = 0, v = 0, tv = 0;
+        for (std::ptrdiff_t i = 0; i < samples.size(); ++i) {
+            if (!(halves[i] > 0)) continue;
+            const double position = samples[i].position - fit.centre;
+            const double off = samples[i].value - next.at(samples[i].position);
+            const double part = off / halves[i], square = part * part;
+            const double weight = (square * square * square + 1e-6) / (halves[i] * halves[i]);
+            w += weight, t += weight * position, tt += weight * position * position;
+            v += weight * off, tv += weight * position * off;
+        }
+        const double determinant = w * tt - t * t;
+        if (!(determinant > 0)) return;
+        // A damped step of Newton's method: the power 8 has a second derivative 7 times that weight.
+        next.value += damping * (tt * v - t * tv) / determinant;
+        next.slope += damping * (w * tv - t * v) / determinant;
+        const double now = largest_share(next);
+        if (now < share) share = now, fit.value = next.value, fit.slope = next.slope;
+    }
+}
+
+void smooth_parabolas(const Array<ChannelSample>& samples, std::ptrdiff_t places, bool closed, int reach,
+                      Array<double>& values) {
+    Array<double> weights(places, 0), sums(places, 0);
+    for (const ChannelSample& s : samples) weights[s.place] += s.weight, sums[s.place] += s.weight * s.value;
+    values.assign(places, 0);
+    for (std::ptrdiff_t k = 0; k < places; ++k) {
+        std::ptrdiff_t first = k - reach, last = k + reach;
+        if (!closed) {
+            first = std::max<std::ptrdiff_t>(std::min(first, places - 1 - 2 * reach), 0);
+            last = std::min<std::ptrdiff_t>(first + 2 * reach, places - 1);
+        }
+        // Differences from the mean, which keep their digits.
+        double s[5] = {}, r[3] = {}, reference = 0;
+        int known = 0;
+        for (std::ptrdiff_t j = first; j <= last; ++j) {
+            const std::ptrdiff_t i = closed ? (j + places) % places : j;
+            if (!(weights[i] > 0)) continue;
+            if (!known++) reference = sums[i] / weights[i];
+            const double t = static_cast<double>(j - k), v = sums[i] - reference * weights[i];
+            double power = 1;
+            for (int e = 0; e < 5; ++e) {
+                s[e] += weights[i] * power;
+                if (e < 3) r[e] += v * power;
+                power *= t;
+            }
+        }
+        values[k] = reference + parabola_at(0, s, r, known);
+    }
+}
+
+}  // namespace rangeedge

@@ -1,0 +1,412 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "chains/smooth.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "chains/channel.hpp"
+#include "chains/line_sums.hpp"
+
+namespace rangeedge {
+namespace {
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+constexpr double jump_aside = 0.5, crease_aside = 0.03;  // pixels that a part of a straight chain may lie aside
+constexpr double ordinate_aside = 3e-5;                  // of ordinates, as a share
+constexpr double least_squared_sine = 0.05;              // of a scan line with a jump, in its weight
+constexpr double least_half = 0.1;                       // pixels across a jump that its candidates confine it to
+constexpr int end_places = 4;
+constexpr double largest_precision = 1e30;           // of a slope
+constexpr int position_reach = 12, least_reach = 4;  // pixels on either side of a parabola
+constexpr int normal_reach = 10;                     // pixels on either side that tell a normal
+constexpr int gradient_rounds = 2;
+constexpr int tangent_reach = 3;  // pixels
+constexpr double reach_per_radius = 0.5;
+constexpr std::ptrdiff_t most_frayed = 6, fray_reach = 16;  // positions at an end, and inside of them
+constexpr double least_fray = 0.8, fray_deviations = 3;     // pixels; standard deviations
+
+struct Sample {
+    const Candidate* candidate;
+    std::ptrdiff_t place;
+    bool before_left;
+};
+
+// Sums over the slopes of a surface on scan lines, by their precision.
+struct SlopeSums {
+    double xx = 0, xy = 0, yy = 0, xm = 0, ym = 0;
+    void add(const SlopeSums& o) { xx += o.xx, xy += o.xy, yy += o.yy, xm += o.xm, ym += o.ym; }
+    // The slope along (nx, ny), where that along (tx, ty) is known.
+    double across(double nx, double ny, double tx, double ty, double along) const {
+        const double nn = xx * nx * nx + 2 * xy * nx * ny + yy * ny * ny;
+        const double nt = xx * nx * tx + xy * (nx * ty + ny * tx) + yy * ny * ty;
+        return nn > 0 ? (xm * nx + ym * ny - along * nt) / nn : nan;
+    }
+};
+
+template <class T>
+class Smoother {
+public:
+    Smoother(const Piece& chain, const Frame<T>& frame, const std::vector<Candidate>& candidates,
+             const Crossings& crossings)
+        : chain_(chain), frame_(frame), candidates_(candidates), crossings_(crossings),
+          jumps_(chain.type == EdgeClass::jump) {}
+
+    SmoothChain smooth() {
+        gather();
+        if (places() < 2) return {};
+        result_.points.resize(static_cast<std::size_t>(places()));
+        find_positions();
+        find_plane();
+        for (const int side : {0, 1}) find_ordinates(side);
+        // The ordinates are those half a pixel aside, until the gradient is known.
+        for (int round = 0; jumps_ && result_.straight && round < gradient_rounds; ++round) {
+            for (const int side : {0, 1}) find_gradients(side);
+            gradients_known_ = true;
+            for (const int side : {0, 1}) find_ordinates(side);
+        }
+        if (!jumps_)
+            for (ChainPoint& p : result_.points)
+                p.ordinate[0] = p.ordinate[1] = (p.ordinate[0] + p.ordinate[1]) / 2;  // the surfaces meet
+        for (const int side : {0, 1}) find_gradients(side);
+        find_measured();
+        find_significance();
+        if (result_.straight) sort_along();
+        return std::move(result_);
+    }
+
+private:
+    std::ptrdiff_t places() const { return means_.size(); }
+    ChainPoint& point(std::ptrdiff_t k) { return result_.points[static_cast<std::size_t>(k)]; }
+
+    std::ptrdiff_t neighbour(std::ptrdiff_t k, std::ptrdiff_t step) const {
+        if (chain_.closed) return (k + step + places()) % places();
+        return std::min(std::max<std::ptrdiff_t>(k + step, 0), places() - 1);
+    }
+
+    void gather() {
+        Array<std::int32_t> members;
+        for (const std::int32_t member : chain_.members) {
+            Point mean;
+            if (!mean_position(candidates_, crossings_, member, chain_.type, mean)) continue;
+            means_.push_back(mean), members.push_back(member);
+        }
+        const std::ptrdiff_t first = frayed(false), end = members.size() - frayed(true);
+        std::copy(means_.begin() + first, means_.begin() + end, means_.begin());
+        means_.resize(end - first);
+        for (std::ptrdiff_t i = first; i < end; ++i)
+            for (std::int32_t k = crossings_.first[members[i]]; k < crossings_.first[members[i] + 1]; ++k) {
+                const Candidate& c = candidates_[static_cast<std::size_t>(crossings_.candidates[k])];
+                if (belongs(c, chain_.type)) samples_.push_back({&c, i - first, false});
+            }
+        for (Sample& s : samples_) {
+            const Point &a = means_[neighbour(s.place, -tangent_reach)], &b = means_[neighbour(s.place, tangent_reach)];
+            const Point step = scan_step(*s.candidate);
+            s.before_left = step.x * (b.y - a.y) - step.y * (b.x - a.x) < 0;
+        }
+    }
+
+    // How many positions at an end lead off the line through those further inside, as they do beside a corner.
+    std::ptrdiff_t frayed(bool at_end) const {
+        if (chain_.closed || places() < fray_reach + most_frayed) return 0;
+        const auto inward = [&](std::ptrdiff_t i) -> const Point& { return means_[at_end ? places() - 1 - i : i]; };
+        const Point& origin = inward(most_frayed);
+        PointSums sums;
+        for (std::ptrdiff_t i = most_frayed; i < most_frayed + fray_reach; ++i)
+            sums.add(inward(i).x - origin.x, inward(i).y - origin.y);
+        const StraightLine line = sums.line(1, 0);
+        const double most = std::max(least_fray, fray_deviations * std::sqrt(line.rss / fray_reach));
+        for (std::ptrdiff_t i = most_frayed; i > 0; --i)
+            if (std::abs(line.off(inward(i - 1).x - origin.x, inward(i - 1).y - origin.y)) > most) return i;
+        return 0;
+    }
+
+    // ---- In the image ----
+
+    void find_positions() {
+        if (!chain_.closed && find_straight_line()) return;
+        const int reach = parabola_reach();
+        Array<double> values;
+        for (const int axis : {0, 1}) {
+            fill([&](const Sample& s) { return static_cast<double>(axis ? s.candidate->y : s.candidate->x); });
+            smooth_parabolas(channel_, places(), chain_.closed, reach, values);
+            for (std::ptrdiff_t k = 0; k < places(); ++k) (axis ? point(k).y : point(k).x) = values[k];
+        }
+        positions_.resize(places());
+        for (std::ptrdiff_t k = 0; k < places(); ++k) positions_[k] = static_cast<double>(k);
+    }
+
+    // By squared distances first, for the direction; then by the offsets across it, which are left out where large.
+    bool find_straight_line() {
+        const Point &a = means_[0], &b = means_[places() - 1];
+        PointSums sums;
+        for (const Point& p : means_) sums.add(p.x - a.x, p.y - a.y);
+        StraightLine line = sums.line(b.x - a.x, b.y - a.y);
+        line.x += a.x, line.y += a.y;
+        AffineFit fit{};
+        for (const bool last : {false, true}) {
+            channel_.clear();
+            for (const Sample& s : samples_) {
+                const double x = static_cast<double>(s.candidate->x), y = static_cast<double>(s.candidate->y);
+                channel_.push_back({s.place, line.along(x, y), line.off(x, y), weight(s, line)});
+            }
+            fit = fit_affine(channel_, jumps_ ? jump_aside : crease_aside);
+            if (last) break;
+            const double x = line.x - line.dy * fit.value + line.dx * fit.centre;
+            const double y = line.y + line.dx * fit.value + line.dy * fit.centre;
+            const double dx = line.dx - fit.slope * line.dy, dy = line.dy + fit.slope * line.dx;
+            const double length = std::hypot(dx, dy);
+            line = {x, y, dx / length, dy / length, 0};
+        }
+        if (!fit.fits) return false;
+        result_.straight = true;
+        if (jumps_) pass_between(channel_, half_distances(line), fit);
+        positions_.assign(places(), 0);
+        Array<double> weights(places(), 0);
+        for (const ChannelSample& s : channel_) positions_[s.place] += s.position, weights[s.place] += 1;
+        for (std::ptrdiff_t k = 0; k < places(); ++k) {
+            const double t = positions_[k] / weights[k], off = fit.at(t);
+            positions_[k] = t;
+            point(k).x = line.x + t * line.dx - off * line.dy;
+            point(k).y = line.y + t * line.dy + off * line.dx;
+        }
+        return true;
+    }
+
+    // Half the distance across the line between the pixels beside each candidate of a jump; 0 where that tells nothing.
+    Array<double> half_distances(const StraightLine& line) const {
+        Array<double> halves(samples_.size(), 0);
+        for (std::ptrdiff_t i = 0; i < samples_.size(); ++i) {
+            const Candidate& c = *samples_[i].candidate;
+            const double x = c.after % frame_.cols - c.before % frame_.cols;
+            const double y = c.after / frame_.cols - c.before / frame_.cols;
+            const double half = std::abs(y * line.dx - x * line.dy) / 2;
+            if (inside(samples_[i]) && half > least_half) halves[i] = half;
+        }
+        return halves;
+    }
+
+    double weight(const Sample& s, const StraightLine& line) const {
+        if (!jumps_) return 1;
+        const Point step = scan_step(*s.candidate);
+        const double across = step.y * line.dx - step.x * line.dy;
+        return 1 / (across * across + least_squared_sine);
+    }
+
+    // Parabolas must be short where the chain turns fast.
+    int parabola_reach() const {
+        double turn = 0;
+        for (std::ptrdiff_t k = 0; k < places(); ++k) {
+            const Point &a = means_[neighbour(k, -position_reach)], &b = means_[k],
+                        &c = means_[neighbour(k, position_reach)];
+            const double cross = (b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x);
+            const double product = std::sqrt(((b.x - a.x) * (b.x - a.x) + (b.y - a.y) * (b.y - a.y)) *
+                                             ((c.x - b.x) * (c.x - b.x) + (c.y - b.y) * (c.y - b.y)));
+            if (product > 0) turn = std::max(turn, std::abs(cross) / product);
+        }
+        const double radius = position_reach / std::max(turn, 1e-3);
+        const auto reach = static_cast<int>(std::min<double>(position_reach, reach_per_radius * radius));
+        return std::min<int>(std::max(reach, least_reach), static_cast<int>((places() - 1) / 2));
+    }
+
+    // One value of each sample; NaN is none.
+    template <class Value>
+    void fill(Value&& value) {
+        channel_.clear();
+        for (const Sample& s : samples_) {
+            const double v = value(s);
+            if (std::isfinite(v)) channel_.push_back({s.place, positions_.empty() ? 0 : positions_[s.place], v, 1});
+        }
+    }
+
+    // An affine function of the position where that fits and the chain is straight, else parabolas.
+    template <class Set>
+    bool smooth_channel(double allowed, Set&& set) {
+        if (channel_.empty()) {
+            for (std::ptrdiff_t k = 0; k < places(); ++k) set(point(k), nan);
+            return false;
+        }
+        if (result_.straight) {
+            const AffineFit fit = fit_affine(channel_, allowed);
+            if (fit.fits) {
+                for (std::ptrdiff_t k = 0; k < places(); ++k) set(point(k), fit.at(positions_[k]));
+                return true;
+            }
+        }
+        const int reach = std::min<int>(position_reach, static_cast<int>((places() - 1) / 2));
+        smooth_parabolas(channel_, places(), chain_.closed, reach, values_);
+        for (std::ptrdiff_t k = 0; k < places(); ++k) set(point(k), values_[k]);
+        return false;
+    }
+
+    // ---- In space ----
+
+    void find_plane() {
+        for (std::ptrdiff_t k = 0; !frame_.points && k < places(); ++k) {
+            ChainPoint& p = point(k);
+            to_plane(p.x, p.y, p.plane);
+        }
+        for (int axis = 0; frame_.points && axis < 2; ++axis) {
+            fill([&](const Sample& s) { return static_cast<double>(s.candidate->plane_position[axis]); });
+            smooth_channel(0, [axis](ChainPoint& p, double v) { p.plane[axis] = v; });
+        }
+    }
+
+    void to_plane(double x, double y, double plane[2]) const {
+        for (const int axis : {0, 1}) {
+            const double* m = frame_.to_plane + 3 * axis;
+            plane[axis] = m[0] * x + m[1] * y + m[2];
+        }
+    }
+
+    // Not at an end of a straight chain, where scan lines cross other edges nearby.
+    bool inside(const Sample& s) const {
+        if (!result_.straight || places() < 4 * end_places) return true;
+        return s.place >= end_places && s.place < places() - end_places;
+    }
+
+    static bool has_sides(const Candidate& c) { return c.sides[0].slope_variance > 0 || c.sides[1].slope_variance > 0; }
+
+    const Side& side_of(const Sample& s, int side) const { return s.candidate->sides[(side == 0) != s.before_left]; }
+
+    double ordinate_at(std::int32_t pixel) const {
+        if (frame_.ordinate) return static_cast<double>(frame_.ordinate[pixel]);
+        double along = 0;
+        for (int i = 0; i < 3; ++i)
+            along += static_cast<double>(frame_.points[3 * std::ptrdiff_t{pixel} + i]) * frame_.axis[i];
+        return frame_.projective ? 1 / along : -along;
+    }
+
+    // Of a surface beside an edge, moved along the scan line to where the candidate was moved.
+    double ordinate(const Sample& s, int side) const {
+        const Candidate& c = *s.candidate;
+        if (!has_sides(c)) {
+            const double near = ordinate_at(c.kind & occluding_bit ? c.before : c.after),
+                         jump = static_cast<double>(c.jump);
+            if (side == 0) return near;
+            return frame_.projective ? 1 / (1 / near + jump) : near - jump;
+        }
+        const Side& own = side_of(s, side);
+        double plane[2] = {static_cast<double>(c.plane_position[0]), static_cast<double>(c.plane_position[1])},
+               moved = 0;
+        if (!frame_.points) {
+            to_plane(static_cast<double>(c.x), static_cast<double>(c.y), plane);
+            for (const int axis : {0, 1})
+                moved += (plane[axis] - static_cast<double>(c.plane_position[axis])) *
+                         static_cast<double>(c.plane_direction[axis]);
+        }
+        const ChainPoint& p = result_.points[static_cast<std::size_t>(s.place)];
+        const double* gradient = p.gradient[side];
+        double aside = 0;
+        if (gradients_known_ && std::isfinite(gradient[0]))
+            for (const int axis : {0, 1}) aside += (p.plane[axis] - plane[axis]) * gradient[axis];
+        return static_cast<double>(own.value) + moved * static_cast<double>(own.slope) + aside;
+    }
+
+    void find_ordinates(int side) {
+        fill([&](const Sample& s) { return inside(s) ? ordinate(s, side) : nan; });
+        double sum = 0;
+        for (const ChannelSample& s : channel_) sum += std::abs(s.value);
+        const double allowed = ordinate_aside * sum / static_cast<double>(std::max<std::ptrdiff_t>(channel_.size(), 1));
+        affine_[side] = smooth_channel(allowed, [side](ChainPoint& p, double v) { p.ordinate[side] = v; });
+    }
+
+    void find_gradients(int side) {
+        Array<SlopeSums> sums(places() + 1);
+        SlopeSums all;
+        for (const Sample& s : samples_) {
+            const Side& own = side_of(s, side);
+            if (!inside(s) || !has_sides(*s.candidate) || !(own.slope_variance > 0) || !(own.slope_variance < endless))
+                continue;
+            const double precision = std::min(1 / static_cast<double>(own.slope_variance), largest_precision);
+            const double x = static_cast<double>(s.candidate->plane_direction[0]), m = static_cast<double>(own.slope);
+            const double y = static_cast<double>(s.candidate->plane_direction[1]), p = precision;
+            const SlopeSums one{p * x * x, p * x * y, p * y * y, p * x * m, p * y * m};
+            sums[s.place].add(one), all.add(one);
+        }
+        if (result_.straight && affine_[side]) {
+            set_gradient(0, side, all, 0, places() - 1);
+            for (std::ptrdiff_t k = 1; k < places(); ++k)
+                std::copy_n(point(0).gradient[side], 2, point(k).gradient[side]);
+            return;
+        }
+        const auto reach = static_cast<int>(std::min<std::ptrdiff_t>(normal_reach, (places() - 1) / 2));
+        for (std::ptrdiff_t k = 0; k < places(); ++k) {
+            SlopeSums near;
+            for (int j = -reach; j <= reach; ++j)
+                if (chain_.closed || (k + j >= 0 && k + j < places())) near.add(sums[neighbour(k, j)]);
+            set_gradient(k, side, near, neighbour(k, -tangent_reach), neighbour(k, tangent_reach));
+        }
+    }
+
+    // From what the slopes tell across the way from one place to another, and the ordinates along it.
+    void set_gradient(std::ptrdiff_t k, int side, const SlopeSums& sums, std::ptrdiff_t first, std::ptrdiff_t last) {
+        const ChainPoint &a = point(first), &b = point(last);
+        double tx = b.plane[0] - a.plane[0], ty = b.plane[1] - a.plane[1];
+        const double length = std::hypot(tx, ty), along = (b.ordinate[side] - a.ordinate[side]) / length;
+        tx /= length, ty /= length;
+        const double across = sums.across(-ty, tx, tx, ty, along);
+        double* gradient = point(k).gradient[side];
+        gradient[0] = along * tx - across * ty, gradient[1] = along * ty + across * tx;
+    }
+
+    // What the candidates of each place say by themselves.
+    void find_measured() {
+        Array<int> counts(places(), 0);
+        for (ChainPoint& p : result_.points) std::fill_n(p.measured, 3, 0.0);
+        for (const Sample& s : samples_) {
+            const double value = jumps_ ? ordinate(s, 0) : (ordinate(s, 0) + ordinate(s, 1)) / 2;
+            if (!std::isfinite(value)) continue;
+            ChainPoint& p = point(s.place);
+            for (const int axis : {0, 1}) p.measured[axis] += static_cast<double>(s.candidate->plane_position[axis]);
+            p.measured[2] += value, ++counts[s.place];
+        }
+        for (std::ptrdiff_t k = 0; k < places(); ++k) {
+            ChainPoint& p = point(k);
+            for (double& v : p.measured) v = counts[k] ? v / counts[k] : nan;
+            if (!frame_.points && counts[k]) to_plane(means_[k].x, means_[k].y, p.measured);
+        }
+    }
+
+    void find_significance() {
+        for (const Sample& s : samples_) {
+            double& most = point(s.place).significance;
+            most = std::max(most, static_cast<double>(s.candidate->significance));
+        }
+    }
+
+    void sort_along() {
+        Array<std::ptrdiff_t> order(places());
+        for (std::ptrdiff_t k = 0; k < places(); ++k) order[k] = k;
+        std::stable_sort(order.begin(), order.end(),
+                         [&](std::ptrdiff_t i, std::ptrdiff_t k) { return positions_[i] < positions_[k]; });
+        std::vector<ChainPoint> sorted;
+        for (const std::ptrdiff_t k : order) sorted.push_back(point(k));
+        result_.points = std::move(sorted);
+    }
+
+    const Piece& chain_;
+    const Frame<T>& frame_;
+    const std::vector<Candidate>& candidates_;
+    const Crossings& crossings_;
+    bool jumps_, affine_[2] = {false, false}, gradients_known_ = false;
+    Array<Point> means_;       // of every place
+    Array<double> positions_;  // along the straight line, else the numbers of places
+    Array<Sample> samples_;
+    Array<ChannelSample> channel_;
+    Array<double> values_;
+    SmoothChain result_;
+};
+
+}  // namespace
+
+template <class T>
+SmoothChain smooth_chain(const Piece& chain, const Frame<T>& frame, const std::vector<Candidate>& candidates,
+                         const Crossings& crossings) {
+    return Smoother<T>(chain, frame, candidates, crossings).smooth();
+}
+
+template SmoothChain smooth_chain(const Piece&, const Frame<float>&, const std::vector<Candidate>&, const Crossings&);
+template SmoothChain smooth_chain(const Piece&, const Frame<double>&, const std::vector<Candidate>&, const Crossings&);
+
+}  // namespace rangeedge
