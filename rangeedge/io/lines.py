@@ -81,13 +81,18 @@ def writeLines(
         raise error(f"cannot write {name!r}: the suffix must be one of {', '.join(_WRITERS)}")
     if transform is not None:
         transform = _transform(transform, suffix)
-    segments = lines.segments if isinstance(lines, Segments) else lines
-    found = list(_of_segments(segments) if _are_segments(segments) else _of_chains(segments))
-    data = _WRITERS[suffix](found, transform)
+    data = encoded_lines(suffix, lines, transform)
     try:
         write_atomically(name, data)
     except OSError as reason:
         raise error(f"cannot write {name!r}: {reason.strerror or reason}", cv2.Error.StsError) from reason
+
+
+def encoded_lines(suffix: str, lines: Any, transform: Sequence[float] | None = None) -> bytes:
+    """Chains or segments as the content of a file."""
+    segments = lines.segments if isinstance(lines, Segments) else lines
+    found = list(_of_segments(segments) if _are_segments(segments) else _of_chains(segments))
+    return _WRITERS[suffix](found, transform)
 
 
 def _transform(transform: Sequence[float], suffix: str) -> list[float]:
