@@ -41,9 +41,11 @@ from .distance import (
     salienceDistanceTransformWithLabels,
 )
 from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
+from .draw_lines import drawChains, drawSegments
 from .edges import EdgeStrength, edgePoints, edgeStrength, kindNames, splitScanLine
 from .flying import flyingPixels
 from .io import RangeImage, imreadRange, imwriteRange
+from .io.lines import writeLines
 from .noise import estimateNoise
 from .noise_model import NoiseModel
 from .options import ScanLineParams
@@ -92,6 +94,7 @@ __all__ = [  # noqa: RUF022
     "linkEdges",
     "Segments",
     "fitSegments",
+    "writeLines",
     "closeContours",
     "distanceTransform",
     "distanceTransformWithLabels",
@@ -104,6 +107,8 @@ __all__ = [  # noqa: RUF022
     "segmentRegions",
     "segmentRegionsWithStats",
     "drawEdges",
+    "drawChains",
+    "drawSegments",
     "drawRegions",
     "colorizeDistance",
     "drawOverview",

@@ -17,14 +17,14 @@ from .options import ScanLineParams
 from .selection import strengthImage
 
 _PLAIN = (255, 255, 255)  # an edge of no known kind
-_KINDS = (  # later entries hide earlier ones
+KINDS = (  # later entries hide earlier ones
     (EDGE_BOUNDARY, (150, 150, 150), "beside no data"),
     (EDGE_CONCAVE, (233, 180, 86), "concave"),
     (EDGE_CONVEX, (66, 228, 240), "convex"),
     (EDGE_JUMP, (0, 94, 213), "jump, near side"),
     (EDGE_OCCLUDED, (167, 121, 204), "jump, far side"),
 )
-_EDGE_COLOURS = np.array([(0, 0, 0), _PLAIN, *(colour for _, colour, _ in _KINDS)], np.uint8)
+_EDGE_COLOURS = np.array([(0, 0, 0), _PLAIN, *(colour for _, colour, _ in KINDS)], np.uint8)
 _REGIONS = np.array(  # Tol's muted scheme
     [
         (238, 204, 136), (119, 102, 204), (119, 204, 221), (51, 119, 17), (136, 34, 51),
@@ -88,7 +88,7 @@ def drawEdges(
     >>> drawEdges(depth, edges)[0, 2]
     array([255, 255, 255], dtype=uint8)
     """
-    canvas = _backdrop(src, K, heightMap)
+    canvas = backdrop(src, K, heightMap)
     edges = _check.image8("edges", edges, canvas.shape[:2])
     kind = None if kind is None else _check.image8("kind", kind, edges.shape)
     _paint(canvas, _colour_index(edges != 0, kind))
@@ -148,7 +148,7 @@ def drawRegions(
     if src is None:
         canvas, alpha = np.zeros((*labels.shape, 3), np.uint8), 1.0
     else:
-        canvas = _backdrop(src, K, heightMap, labels.shape)
+        canvas = backdrop(src, K, heightMap, labels.shape)
     inside = labels > 0
     if inside.any():
         colours = _region_colours(labels, inside)
@@ -314,7 +314,7 @@ def region_overview(
     return _sheet(panels, title)
 
 
-def _backdrop(
+def backdrop(
     src: np.ndarray, K: np.ndarray | None, heightMap: bool, shape: tuple[int, int] | None = None
 ) -> np.ndarray:
     """A new picture to draw on: the one given, or the subdued relief of a range image."""
@@ -399,7 +399,7 @@ def _colour_index(edges: np.ndarray, kind: np.ndarray | None) -> np.ndarray:
     """Index into the colours of edges; 0 is no edge, and the larger one hides the smaller."""
     index = edges.astype(np.uint8)
     if kind is not None:
-        for i, (bit, _, _) in enumerate(_KINDS, start=2):
+        for i, (bit, _, _) in enumerate(KINDS, start=2):
             index[edges & (kind & bit != 0)] = i
     return index
 
@@ -532,7 +532,7 @@ def _text_width(text: str) -> int:
 def _key(width: int) -> np.ndarray:
     """The colours of edges with their meaning, on as many lines as they need."""
     lines, x = [_bar("", width)], 6
-    for colour, text in [*((colour, text) for _, colour, text in reversed(_KINDS)), (_PLAIN, "other")]:
+    for colour, text in [*((colour, text) for _, colour, text in reversed(KINDS)), (_PLAIN, "other")]:
         needed = _text_width(text) + 24
         if x > 6 and x + needed > width:
             lines.append(_bar("", width))

@@ -19,12 +19,15 @@ from rangeedge import (
     distanceTransform,
     edgePoints,
     edgeStrength,
+    fitSegments,
     imreadRange,
     imwriteRange,
+    linkEdges,
     segmentRegions,
     segmentRegionsWithStats,
 )
 from rangeedge.app.cli import main
+from rangeedge.app.lines import LINE_FILES
 from rangeedge.app.results import EDGE_FILES, REGION_FILES, find_regions, region_files, write_folder
 
 K = np.array([[100, 0, 39.5], [0, 100, 29.5], [0, 0, 1]])
@@ -480,3 +483,26 @@ class TestBench:
         code, said, complaint = run(capsys, "bench", *argv, "--repeat", 1)
         assert (code, said) == (2, "")
         assert argv[0] in complaint
+
+
+def test_lines_writes_chains_and_segments(image, tmp_path, capsys):
+    out = tmp_path / "lines"
+    code, said, _ = run(capsys, "lines", image, *CAMERA, "--out", out)
+    assert code == 0
+    assert {path.name for path in out.iterdir()} == set(LINE_FILES)
+    report = json.loads((out / "report.json").read_text())
+    chains = linkEdges(imreadRange(image).src, K=K)
+    assert report["chains"] == len(chains) >= 4
+    assert report["segments"] == len(fitSegments(chains).segments) == 4
+    assert f"{report['chains']} chains, 4 segments" in said
+    assert len((out / "chains.csv").read_text().splitlines()) == 1 + len(chains.points)
+    assert cv2.imread(str(out / "lines.png")).shape == (900, 1200, 3)
+
+
+def test_lines_takes_the_options_of_linking(image, tmp_path, capsys):
+    assert (
+        run(capsys, "lines", image, *CAMERA, "--corner-angle", "180", "--bridge", "9", "--out", tmp_path / "a")[0] == 0
+    )
+    assert json.loads((tmp_path / "a" / "report.json").read_text())["segments"] == 0
+    assert run(capsys, "lines", image, *CAMERA, "--bridge", "-1", "--out", tmp_path / "b")[0] == 2
+    assert not (tmp_path / "b").exists()

@@ -21,6 +21,7 @@ PICTURES = {
     "seeds": ["seeds.png", "seeds.tiff"],
     "segmentation": ["segmentation.png"],
     "pipeline": ["candidates.png"],
+    "box_dimensions": ["box_dimensions.png"],
 }
 
 
@@ -87,6 +88,12 @@ def test_pipeline_grips_every_object_of_the_scene(tmp_path):
     # Tops of boxes are parallel to the table, which is seen under 32 degrees.
     tops = [row for row in rows if abs(row["normal_y"] + np.cos(np.radians(32))) < 0.03]
     assert len(tops) >= 3
+
+
+def test_the_box_is_measured_within_two_millimetres(tmp_path):
+    sizes = run("box_dimensions", "--out", tmp_path)
+    assert [count for _, _, count in sizes] == [3, 3, 3]
+    assert np.allclose([length for length, _, _ in sizes], (0.20, 0.25, 0.30), atol=0.002)
 
 
 def test_pipeline_needs_a_camera(tmp_path, capsys):

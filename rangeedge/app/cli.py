@@ -1,4 +1,4 @@
-"""The command `rangeedge`: detect, segment, batch, demo and bench."""
+"""The command `rangeedge`: detect, segment, lines, batch, demo and bench."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import numpy as np
 from .. import __version__
 from .._check import error, named
 from .._option import Option
-from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing
+from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing, Linking
 from .batch import detect_file, detectBatch, read_image
 from .results import (
     EDGE_FILES,
@@ -42,6 +42,9 @@ _EPILOGUES = {
     "segment": """examples:
   rangeedge segment depth.png -K 525,525,319.5,239.5 --out regions
   rangeedge segment cloud.pcd --min-area 300 --out regions""",
+    "lines": """examples:
+  rangeedge lines depth.png -K 525,525,319.5,239.5 --out lines
+  rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines""",
     "batch": """examples:
   rangeedge batch frames/*.png -K 525,525,319.5,239.5 --out edges --jobs 2
 Run it again after an interruption, and it does what is missing.""",
@@ -92,6 +95,13 @@ def _parser() -> argparse.ArgumentParser:
     _add_options(segment, "how regions grow", Growing.options)
     _add_detector(segment)
 
+    lines = _command(commands, "lines", _lines, "find the edges of one range image as lines in space")
+    lines.add_argument("image", metavar="IMAGE", help=_INPUT)
+    _add_out(lines)
+    _add_geometry(lines)
+    _add_options(lines, "how lines are linked", Linking.options)
+    _add_detector(lines)
+
     batch = _command(commands, "batch", _batch, "find the edges of many range images")
     batch.add_argument("images", metavar="IMAGE", nargs="+", help=_INPUT)
     _add_out(batch, "a folder for each image is made in it")
@@ -133,6 +143,7 @@ def _command(commands: Any, name: str, run: Callable[[argparse.Namespace], int],
 _USAGES = {
     "detect": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "segment": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
+    "lines": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "batch": "IMAGE... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "demo": "[--real] [options] --out DIR",
     "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
@@ -249,6 +260,18 @@ def _segment(args: argparse.Namespace) -> int:
     _say_found(args.image, found.edges)
     print(f"{len(found.surfaces) - 1} regions from {found.seeds.max()} seeds")
     _say_written(args.out, REGION_FILES)
+    return 0
+
+
+def _lines(args: argparse.Namespace) -> int:
+    from .lines import LINE_FILES, find_lines, line_files
+
+    options = _options(args)
+    image = read_image(args.image, options)
+    chains, found = find_lines(image)
+    write_folder(args.out, line_files(image, chains, found, args.image, options))
+    print(f"{args.image}: {len(chains)} chains, {len(found.segments)} segments, {len(found.vertices)} vertices")
+    _say_written(args.out, LINE_FILES)
     return 0
 
 

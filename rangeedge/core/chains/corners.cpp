@@ -15,7 +15,7 @@ namespace {
 constexpr int least_arm = 6, arms[] = {least_arm, 12, 24, 48};  // positions on either side of a corner
 constexpr int least_run = 4;                                    // positions that make a line
 constexpr int least_part = 8;                                   // pixels between two corners
-// Variance ratio of parabola and two lines: to look closer, and of a corner between its neighbours.
+// Variance ratio of a smooth curve and two lines: to look closer, and of a corner between its neighbours.
 constexpr double possible_gain = 8, least_gain = 20;
 constexpr std::ptrdiff_t longest_arm = 96;  // positions on either side
 
@@ -43,6 +43,30 @@ double parabola_rss(const Point* p, int n) {
     const double n2 = s[4] - a * s[3] - b * s[2], c2 = r[2] - a * r[1] - b * r[0], c1 = r[1] - m * r[0];
     return std::max(rr - r[0] * r[0] / s[0] - c1 * c1 / n1 - (n2 > 0 ? c2 * c2 / n2 : 0), 0.0);
 }
+
+// The sum of squared residuals of the circle x^2 + y^2 = a x + b y + c with the least sum of squared errors of that.
+double circle_rss(const Point* p, int n) {
+    double mx = 0, my = 0;
+    for (int k = 0; k < n; ++k) mx += p[k].x / n, my += p[k].y / n;
+    double xx = 0, xy = 0, yy = 0, xq = 0, yq = 0, q = 0;
+    for (int k = 0; k < n; ++k) {
+        const double x = p[k].x - mx, y = p[k].y - my, square = x * x + y * y;
+        xx += x * x, xy += x * y, yy += y * y, xq += x * square, yq += y * square, q += square;
+    }
+    const double determinant = xx * yy - xy * xy;
+    if (!(determinant > 1e-9 * (xx + yy) * (xx + yy))) return HUGE_VAL;
+    const double cx = (yy * xq - xy * yq) / determinant / 2, cy = (xx * yq - xy * xq) / determinant / 2;
+    const double radius = std::sqrt(q / n + cx * cx + cy * cy);
+    double rss = 0;
+    for (int k = 0; k < n; ++k) {
+        const double x = p[k].x - mx - cx, y = p[k].y - my - cy, off = std::sqrt(x * x + y * y) - radius;
+        rss += off * off;
+    }
+    return rss;
+}
+
+// That of the smooth curve that fits better, a parabola or, where the points turn far, a circle.
+double smooth_rss(const Point* p, int n) { return std::min(parabola_rss(p, n), circle_rss(p, n)); }
 
 struct TwoLines {
     double rss, turn;    // turn in degrees
@@ -86,13 +110,13 @@ private:
     std::ptrdiff_t size() const { return points_.size(); }
     const Point& at(std::ptrdiff_t i) const { return points_[(i + 2 * size()) % size()]; }
 
-    // By how much two lines are better than a parabola; 0 where they turn too little.
+    // By how much two lines are better than a smooth curve; 0 where they turn too little.
     double gain(const TwoLines& lines, int n) const {
         if (lines.turn < least_angle_) return 0;
         constexpr double rounding = 1e-4;  // squared pixels a point, so that positions without noise have some
         const double independent = (1 - lines.correlation) / (1 + lines.correlation);  // share of the points
         const double scatter = (lines.rss + rounding * n) / (n - 4) / independent;
-        return (parabola_rss(window_.data(), n) - lines.rss) / scatter;
+        return (smooth_rss(window_.data(), n) - lines.rss) / scatter;
     }
 
     // That of the i-th corner, from the one before to the one after, between which it is moved to the best place.

@@ -1,5 +1,5 @@
-// Chains are cut at corners. A corner is where two straight lines fit the positions much better than a parabola does, by
-// the ratio of their sums of squared residuals, of which neighbours that are alike count less.
+// Chains are cut at corners. A corner is where two straight lines fit the positions much better than a parabola or a
+// circle does, by the ratio of their sums of squared residuals, of which neighbours that are alike count less.
 //
 // Places where chords of several lengths turn most are looked at first; then of all corners found the least is taken
 // back, again and again, while the lines between its neighbours do not confirm it; and last longer stretches are searched

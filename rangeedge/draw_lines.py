@@ -1,0 +1,167 @@
+"""Pictures of chains and of segments, in the colours of `drawEdges`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from ._check import deliver, described, fail, integer, public
+from .chains import EdgeChain, EdgeChains
+from .draw import KINDS, backdrop
+from .segments import SEGMENT, VERTEX
+
+_SHIFT = 4  # binary digits of fractions of a pixel
+_VERTEX = (255, 255, 255)
+_INK, _HALO = (255, 255, 255), (0, 0, 0)
+
+
+@public
+def drawChains(
+    src: np.ndarray,
+    chains: EdgeChains | Sequence[EdgeChain],
+    dst: np.ndarray | None = None,
+    *,
+    scale: int = 1,
+    K: np.ndarray | None = None,
+    heightMap: bool = False,
+) -> np.ndarray:
+    """Draw chains as smooth lines over the shaded relief of a range image, or over a picture.
+
+    drawChains(src, chains[, dst], *[, scale[, K[, heightMap]]]) -> dst
+
+    Jumps are vermilion, convex edges yellow, concave ones blue. Open chains have a dot at either end.
+
+    Parameters
+    ----------
+    src : ndarray
+        A range image (H, W), points (H, W, 3) or (H, W, 4) of floats, or a CV_8UC3 picture to draw on.
+    chains : EdgeChains or sequence of EdgeChain
+    dst : ndarray of shape (scale H, scale W, 3), CV_8U, optional
+        Receives the result where shape and type fit.
+    scale : int
+        Pixels of the picture to one of the image, from 1 to 16.
+    K, heightMap
+        Geometry of a range image, as for :func:`drawEdges`.
+
+    Returns
+    -------
+    dst : ndarray of shape (scale H, scale W, 3), CV_8U
+
+    Raises
+    ------
+    rangeedge.error
+        On a bad argument.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rangeedge import drawChains, linkEdges
+    >>> roof = np.abs(np.arange(64) + 0.3 * np.arange(48)[:, None] - 40.3)
+    >>> drawChains(roof, linkEdges(roof, pixelSize=1, noise=0.001), scale=4).shape
+    (192, 256, 3)
+    """
+    if not isinstance(chains, Sequence) or not all(isinstance(chain, EdgeChain) for chain in chains):
+        raise fail("chains", "EdgeChains, or a sequence of EdgeChain", described(chains))
+    canvas, scale = _canvas(src, scale, K, heightMap)
+    for chain in chains:
+        places = np.column_stack([chain.points["x"], chain.points["y"]])
+        places = places[np.isfinite(places).all(axis=1)]
+        _line(canvas, places, chain.kind, scale, closed=chain.closed)
+        if not chain.closed:
+            for end in places[[0, -1]]:
+                _dot(canvas, end, _colour(chain.kind), scale)
+    return deliver("dst", canvas, dst)
+
+
+@public
+def drawSegments(
+    src: np.ndarray,
+    segments: np.ndarray,
+    vertices: np.ndarray | None = None,
+    dst: np.ndarray | None = None,
+    *,
+    scale: int = 1,
+    lengths: bool = False,
+    K: np.ndarray | None = None,
+    heightMap: bool = False,
+) -> np.ndarray:
+    """Draw segments and the vertices in which they meet over the relief of a range image, or over a picture.
+
+    drawSegments(src, segments[, vertices[, dst]], *[, scale[, lengths[, K[, heightMap]]]]) -> dst
+
+    Colours are those of `drawChains`; vertices are white dots.
+
+    Parameters
+    ----------
+    src, dst, scale, K, heightMap
+        As in `drawChains`.
+    segments, vertices : structured ndarray
+        From `fitSegments`.
+    lengths : bool
+        Whether to write the length of each segment beside it.
+
+    Returns
+    -------
+    dst : ndarray of shape (scale H, scale W, 3), CV_8U
+
+    Raises
+    ------
+    rangeedge.error
+        On a bad argument.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rangeedge import drawSegments, fitSegments, linkEdges
+    >>> roof = np.abs(np.arange(64) + 0.3 * np.arange(48)[:, None] - 40.3)
+    >>> found = fitSegments(linkEdges(roof, pixelSize=1, noise=0.001))
+    >>> drawSegments(roof, *found, lengths=True).shape
+    (48, 64, 3)
+    """
+    for name, value, dtype in (("segments", segments, SEGMENT), ("vertices", vertices, VERTEX)):
+        if value is not None and (not isinstance(value, np.ndarray) or value.dtype != dtype):
+            raise fail(name, "a structured array from fitSegments", described(value))
+    canvas, scale = _canvas(src, scale, K, heightMap)
+    for segment in segments:
+        _line(canvas, segment["pixels"], int(segment["kind"]), scale)
+    for vertex in vertices if vertices is not None else ():
+        _dot(canvas, np.array([vertex["x"], vertex["y"]]), _VERTEX, scale)
+    for segment in segments if lengths else ():
+        _label(canvas, segment["pixels"].mean(axis=0), f"{segment['length']:.4g}", scale)
+    return deliver("dst", canvas, dst)
+
+
+def _canvas(src: np.ndarray, scale: int, K: np.ndarray | None, heightMap: bool) -> tuple[np.ndarray, int]:
+    scale = integer("scale", scale, 1, 16)
+    canvas = backdrop(src, K, heightMap)
+    if scale > 1:
+        canvas = cv2.resize(canvas, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
+    return canvas, scale
+
+
+def _colour(kind: int) -> tuple[int, int, int]:
+    return next((colour for bit, colour, _ in reversed(KINDS) if kind & bit), _VERTEX)
+
+
+def _fixed(places: np.ndarray, scale: int) -> np.ndarray:
+    """Places as integers of OpenCV, pixel centres being whole numbers in the image as in the picture."""
+    return np.rint(((places + 0.5) * scale - 0.5) * (1 << _SHIFT)).astype(np.int32)
+
+
+def _line(canvas: np.ndarray, places: np.ndarray, kind: int, scale: int, *, closed: bool = False) -> None:
+    width = max(1, (scale + 1) // 2)
+    cv2.polylines(canvas, [_fixed(places, scale)], closed, _colour(kind), width, cv2.LINE_AA, _SHIFT)
+
+
+def _dot(canvas: np.ndarray, place: np.ndarray, colour: tuple[int, int, int], scale: int) -> None:
+    x, y = _fixed(place, scale).tolist()
+    cv2.circle(canvas, (x, y), (scale + 1) << _SHIFT, colour, cv2.FILLED, cv2.LINE_AA, _SHIFT)
+
+
+def _label(canvas: np.ndarray, place: np.ndarray, text: str, scale: int) -> None:
+    x, y = (_fixed(place, scale) >> _SHIFT).tolist()
+    size = 0.3 + 0.06 * scale
+    for colour, width in ((_HALO, 3), (_INK, 1)):
+        cv2.putText(canvas, text, (x + 4, y - 4), cv2.FONT_HERSHEY_SIMPLEX, size, colour, width, cv2.LINE_AA)

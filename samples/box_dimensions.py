@@ -1,0 +1,61 @@
+"""Dimensions of a box from one depth frame: its edges, its corners, and how long it is along its three directions.
+
+    python samples/box_dimensions.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
+
+Without an image it renders a box as a Kinect would see it, and prints how far the result is from the truth.
+"""
+
+import numpy as np
+from common import load, parser, write
+
+import rangeedge
+from rangeedge.synthetic import box, kinectCamera, kinectNoise, plane, renderScene
+
+SIZE = (0.20, 0.25, 0.30)  # of the rendered box, in metres
+PARALLEL = np.cos(np.radians(10))  # segments that meet at less run along one direction of the box
+
+
+def built_in_scene():
+    """A box in front of a wall, as a Kinect would see it."""
+    axes = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    scene = [plane((0, 0, 1.3), (0.05, -0.3, -1)), box((0, 0, 1.0), SIZE[::-1], axes)]
+    scan = kinectNoise(renderScene(scene, kinectCamera()), seed=3)
+    return scan.src, scan.geometry
+
+
+def dimensions(segments):
+    """Mean length, its deviation and the number of edges along each direction, of edges between two corners."""
+    whole = segments[(segments["vertices"] >= 0).all(axis=1)]
+    left = np.ones(len(whole), bool)
+    found = []
+    while left.any():
+        first = whole[left][whole[left]["endDeviation"].argmin()]
+        alike = left & (np.abs(whole["direction"] @ first["direction"]) > PARALLEL)
+        lengths = whole["length"][alike]
+        deviation = lengths.std(ddof=1) / np.sqrt(len(lengths)) if len(lengths) > 1 else np.nan
+        found.append((lengths.mean(), deviation, len(lengths)))
+        left &= ~alike
+    return sorted(found)
+
+
+def main(argv=None):
+    args = parser(__doc__).parse_args(argv)
+    rendered = args.image is None
+    src, geometry = built_in_scene() if rendered else load(args)
+
+    found = rangeedge.fitSegments(rangeedge.linkEdges(src, **geometry))
+    sizes = dimensions(found.segments)
+    print(f"{len(found.segments)} edges, {len(found.vertices)} corners")
+    for i, (length, deviation, count) in enumerate(sizes):
+        truth = f", truth {SIZE[i]:.4f}, error {1000 * (length - SIZE[i]):+.2f} mm" if rendered else ""
+        print(f"{length:.4f} +- {deviation:.4f} from {count} edges{truth}")
+    convex = found.segments["dihedral"][found.segments["kind"] == rangeedge.EDGE_CONVEX]
+    print("angles between faces:", " ".join(f"{angle:.2f}" for angle in convex), "degrees")
+
+    view = {name: geometry[name] for name in ("K", "heightMap") if name in geometry}
+    write(args.out, "box_dimensions.png", rangeedge.drawSegments(src, *found, scale=2, lengths=True, **view))
+    return sizes
+
+
+if __name__ == "__main__":
+    main()
