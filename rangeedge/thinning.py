@@ -18,7 +18,7 @@ _METHODS = {
 
 @_check.public
 def thinEdges(
-    edges: np.ndarray, method: int = THIN_MEDIAL, dst: np.ndarray | None = None, *, spurLength: int = 3
+    edges: np.ndarray, method: int = THIN_MEDIAL, dst: np.ndarray | None = None, *, spurLength: int = 5
 ) -> np.ndarray:
     """Thin an edge map to lines one pixel wide that are connected as the map was.
 

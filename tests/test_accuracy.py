@@ -71,11 +71,12 @@ def seen(request):
 
 
 def test_every_edge_is_found_within_a_pixel(seen):
-    _, rendering, strength = seen
+    _, rendering, _ = seen
+    strength = strength_of(rendering, maxSmear=0)  # else faces that are a few pixels wide may be taken for smear
     truth = rendering.edges(JUMP, CREASE)
     edges = (truth > 0) & (truth < 4)
     assert edges.sum() > 1000
-    # A neighbouring pixel, diagonal ones included. Corners of faces that are a few pixels wide may be taken for smear.
+    # A neighbouring pixel, diagonal ones included.
     assert within(edge_pixels(strength), 1.5)[edges].mean() > 0.999
 
 

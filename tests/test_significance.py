@@ -55,25 +55,29 @@ def test_significance_is_in_deviations_of_what_neighbours_tell_together(edge):
     np.testing.assert_allclose(of(**{other: 2.5}), of(), rtol=1e-5)
 
 
-def test_lines_stay_that_are_significant_somewhere():
-    crease, significance = np.zeros((2, 9, 30), np.float32)
-    crease[2:4, 3:27] = crease[6:8, 3:27] = 60
-    significance[crease > 0] = 8
-    significance[3, 20] = 15
+def test_what_pixels_of_a_line_tell_adds_up_along_it():
+    """A line of 40 pixels needs half the significance of one of 10, whose pixels need that of the line."""
+    crease, significance = np.zeros((2, 9, 60), np.float32)
+    crease[2:4, 3:43] = crease[6:8, 3:43] = crease[2:4, 45:55] = crease[6:8, 45:55] = 60
+    significance[2:4, 3:43], significance[6:8, 3:43] = 7.1, 6.9
+    significance[2:4, 45:55], significance[6:8, 45:55] = 14.1, 13.9
     strength = EdgeStrength(np.zeros_like(crease), crease, np.zeros(crease.shape, np.uint8), significance)
-    edges = selectEdges(strength) > 0
-    assert edges[2:4, 3:27].all()
-    assert not edges[6:8].any()
+    edges = selectEdges(strength, lineSignificance=14) > 0
+    assert np.array_equal(edges[:5], crease[:5] > 0)
+    assert not edges[5:].any()
     assert np.array_equal(selectEdges(strength, lineSignificance=0) > 0, crease > 0)
-    assert not selectEdges(strength, lineSignificance=15.1).any()
+    significance[2:4, 45:55:2], significance[2:4, 46:55:2] = 0, 14.1 * np.sqrt(2)  # the root mean square counts
+    assert (selectEdges(strength, lineSignificance=14)[2:4, 45:55] > 0).all()
 
 
-def test_the_detector_leaves_lines_out_that_are_nowhere_significant():
+def test_the_detector_leaves_lines_out_that_are_not_significant():
     z = 1 + 0.002 * np.abs(U - 29.6) * np.ones((50, 1)) + np.random.default_rng(2).normal(0, 0.004, (50, 60))
     strength = edgeStrength(z, noise=0.004, pixelSize=0.002)
-    peak = strength.significance[selectEdges(strength, lineSignificance=0) > 0].max()
-    for least, found in ((None, True), (0.99 * peak, True), (1.01 * peak, False)):
-        options = {} if least is None else {"lineSignificance": least}
+    for least in (0, 5, 10, 14, 20, 30, 1000):
+        options = {"lineSignificance": least}
+        found = selectEdges(strength, **options).any()
+        assert found or least > 14
+        assert not found or least < 1000
         assert detectEdges(z, noise=0.004, pixelSize=0.002, **options).any() == found
 
 

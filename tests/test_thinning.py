@@ -463,7 +463,7 @@ def test_shift(method):
 
 def test_defaults():
     edges = random_map(np.random.default_rng(8), "closed")
-    assert np.array_equal(thinEdges(edges), thinEdges(edges, THIN_MEDIAL, spurLength=3))
+    assert np.array_equal(thinEdges(edges), thinEdges(edges, THIN_MEDIAL, spurLength=5))
     assert len({thinEdges(scene(6), method).tobytes() for method in METHODS.values()}) == len(METHODS)
 
 
