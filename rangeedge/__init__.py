@@ -46,6 +46,7 @@ from .io import RangeImage, imreadRange, imwriteRange
 from .noise import estimateNoise
 from .noise_model import NoiseModel
 from .options import ScanLineParams
+from .plausible import RangeEdgeWarning
 from .regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
 from .seeds import extractSeeds, extractSeedsWithStats
 from .selection import overallStrength, selectEdges, strengthImage
@@ -62,6 +63,7 @@ __version__ = "0.1.0"
 # In the order data flows.
 __all__ = [  # noqa: RUF022
     "error",
+    "RangeEdgeWarning",
     "RangeImage",
     "imreadRange",
     "imwriteRange",

@@ -20,9 +20,9 @@ import rangeedge
 from rangeedge import _core
 
 PUBLIC = """
-    error RangeImage imreadRange imwriteRange NoiseModel estimateNoise ScanLineParams splitScanLine
-    EdgeStrength edgeStrength edgePoints kindNames flyingPixels strengthImage overallStrength selectEdges thinEdges detectEdges
-    detectEdgesWithStrength
+    error RangeEdgeWarning RangeImage imreadRange imwriteRange NoiseModel estimateNoise ScanLineParams splitScanLine
+    EdgeStrength edgeStrength edgePoints kindNames flyingPixels strengthImage overallStrength selectEdges thinEdges
+    detectEdges detectEdgesWithStrength
     ScanLineDetector createScanLineDetector closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
     extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats

@@ -20,7 +20,7 @@ ShadowStep step_across_shadow(const Line<T>& line, const Fit& f, const Fit& g, i
     const double end = near.value(x_near), beyond = far.value(x_far), below = far.value(x_near);
     if (line.frame->projective && !(std::min({end, beyond, below}) > 0)) return {};
     if (spaced && line.grazing_angle(before, after) > veil) return {};
-    step.jump = std::min(line.depth(beyond), line.depth(below)) - line.depth(end);
+    step.jump = std::min(line.depth(beyond, x_far), line.depth(below, x_near)) - line.depth(end, x_near);
     step.difference = end - std::max(beyond, below);
     if (!spaced) step.difference = std::min(step.difference, near.value(x_far) - beyond);
     const FitDeviation deviation =
