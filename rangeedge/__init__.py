@@ -49,6 +49,7 @@ from .io.lines import writeLines
 from .noise import estimateNoise
 from .noise_model import NoiseModel
 from .options import ScanLineParams
+from .plausible import RangeEdgeWarning
 from .projection import backproject, project
 from .regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
 from .seeds import extractSeeds, extractSeedsWithStats
@@ -67,6 +68,7 @@ __version__ = "0.1.0"
 # In the order data flows.
 __all__ = [  # noqa: RUF022
     "error",
+    "RangeEdgeWarning",
     "RangeImage",
     "imreadRange",
     "imwriteRange",

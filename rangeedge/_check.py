@@ -6,11 +6,15 @@ A check names the argument. `public` names the function: it stands on every func
 from __future__ import annotations
 
 import functools
+import os
 from collections.abc import Callable, Collection
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 import cv2
 import numpy as np
+
+if TYPE_CHECKING:
+    from .io.camera import Camera
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -162,21 +166,62 @@ def boolean(name: str, value: Any) -> bool:
 
 
 def camera_matrix(name: str, value: Any) -> np.ndarray:
-    """The 3x3 matrix of a pinhole camera, as float64."""
-    expected = "a 3x3 camera matrix [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with finite entries and fx, fy > 0"
+    """The 3x3 matrix of a pinhole camera given in any form, as float64."""
+    from .io.camera import matrix_of
+
     try:
-        matrix = np.array(value)
-    except ValueError:
+        return matrix_of(value)
+    except (TypeError, ValueError) as reason:
+        expected = "a camera: (fx, fy, cx, cy), 9 numbers, 3x3, 3x4, or the name of a file of one"
+        raise fail(name, expected, f"{described(value)} ({reason})") from None
+
+
+def camera_file(name: str, path: str | os.PathLike[str]) -> Camera:
+    """The camera that a file describes."""
+    from .io.camera import read_camera
+
+    try:
+        return read_camera(path)
+    except (OSError, ValueError) as reason:
+        what = getattr(reason, "err", None) or getattr(reason, "strerror", None) or reason
+        raise fail(name, "a camera or the name of a file of one", f"{os.fspath(path)!r} ({what})") from None
+
+
+def distortion(name: str, value: Any) -> np.ndarray:
+    """Coefficients of distortion as float64, as many as cv2 knows."""
+    expected = "4, 5, 8, 12 or 14 finite numbers"
+    try:
+        coefficients = np.array(value, dtype=np.float64).ravel()
+    except (TypeError, ValueError):
         raise fail(name, expected, described(value)) from None
-    if matrix.dtype.kind not in "iuf":
+    if len(coefficients) not in (4, 5, 8, 12, 14) or not np.isfinite(coefficients).all():
         raise fail(name, expected, described(value))
-    matrix = matrix.astype(np.float64)
-    if matrix.shape != (3, 3):
-        raise fail(name, expected, described(value), cv2.Error.StsBadSize)
-    upper = matrix[0, 0] > 0 and matrix[1, 1] > 0 and matrix[1, 0] == 0 and np.array_equal(matrix[2], (0, 0, 1))
-    if not (upper and np.isfinite(matrix).all()):
-        raise fail(name, expected, matrix.tolist())
-    return matrix
+    return coefficients
+
+
+def point(name: str, value: Any) -> tuple[float, float, float]:
+    """Three finite coordinates."""
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(value, (tuple, list)) or len(value) != 3:
+        raise fail(name, "three coordinates (x, y, z)", described(value))
+    x, y, z = (number(name, coordinate) for coordinate in value)
+    return x, y, z
+
+
+def invalid_values(name: str, value: Any) -> tuple[tuple[float, float], ...]:
+    """Ranges (low, high) of a number, or of a sequence of numbers and pairs."""
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    ranges = []
+    for item in value if isinstance(value, (tuple, list)) else (value,):
+        item = item.tolist() if isinstance(item, np.ndarray) else item
+        low, high = item if isinstance(item, (tuple, list)) and len(item) == 2 else (item, item)
+        for bound in (low, high):
+            if isinstance(bound, (bool, np.bool_)) or not isinstance(bound, (int, float, np.integer, np.floating)):
+                raise fail(name, "a number, or a sequence of numbers and of pairs (low, high)", described(value))
+        if low > high:
+            raise fail(name, "low <= high in every pair", described(item), cv2.Error.StsOutOfRange)
+        ranges.append((float(low), float(high)))
+    return tuple(ranges)
 
 
 def pixel_size(name: str, value: Any) -> tuple[float, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 
 import numpy as np
@@ -19,9 +20,30 @@ SENSORS = {
 }
 
 
-def camera(text: str) -> np.ndarray:
-    fx, fy, cx, cy = _numbers(text, (4,), "four numbers fx,fy,cx,cy")
-    return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+def camera(text: str) -> np.ndarray | str:
+    """A camera matrix of 4, 9 or 12 numbers, else the name of a file."""
+    if os.path.exists(text):
+        return text
+    from .io.camera import matrix_of
+
+    return matrix_of(_numbers(text, (4, 9, 12), "four numbers fx,fy,cx,cy, or the name of a camera's file"))
+
+
+def distortion(text: str) -> list[float]:
+    return _numbers(text, (4, 5, 8, 12, 14), "4, 5, 8, 12 or 14 numbers k1,k2,p1,p2[,k3[,...]]")
+
+
+def point(text: str) -> list[float]:
+    return _numbers(text, (3,), "three numbers x,y,z")
+
+
+def invalid_values(text: str) -> list[float | list[float]]:
+    """Values and ranges low:high, joined by commas."""
+    ranges = []
+    for part in text.split(","):
+        numbers = _numbers(part.replace(":", ","), (1, 2), "values and ranges low:high, joined by commas")
+        ranges.append(numbers[0] if len(numbers) == 1 else numbers)
+    return ranges
 
 
 def pixel_size(text: str) -> float | tuple[float, ...]:

@@ -101,7 +101,7 @@ def _write_node(fs: cv2.FileStorage, name: str, value: Any) -> None:
     elif isinstance(value, tuple):
         fs.startWriteStruct(name, cv2.FileNode_SEQ)
         for element in value:
-            fs.write("", element)
+            _write_node(fs, "", element)
         fs.endWriteStruct()
     elif isinstance(value, np.ndarray):
         fs.write(name, value)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypedDict
 
@@ -15,18 +16,24 @@ if TYPE_CHECKING:
 
 
 class GeometryOptions(TypedDict, total=False):
-    K: ArrayLike | None
+    K: ArrayLike | str | os.PathLike[str] | None
+    distCoeffs: ArrayLike | None
     pixelSize: float | Sequence[float] | None
     heightMap: bool
     depthFactor: float
+    invalid: float | Sequence[float | Sequence[float]] | None
+    origin: Sequence[float] | None
 
 
 class ScanLineOptions(TypedDict, total=False):
     epsFactor: float
-    K: ArrayLike | None
+    K: ArrayLike | str | os.PathLike[str] | None
+    distCoeffs: ArrayLike | None
     pixelSize: float | Sequence[float] | None
     heightMap: bool
     depthFactor: float
+    invalid: float | Sequence[float | Sequence[float]] | None
+    origin: Sequence[float] | None
     noise: NoiseModel | float | np.ndarray | None
     directions: int
     fit: int
@@ -54,10 +61,13 @@ class SeedingOptions(TypedDict, total=False):
 
 
 class GrowingOptions(TypedDict, total=False):
-    K: ArrayLike | None
+    K: ArrayLike | str | os.PathLike[str] | None
+    distCoeffs: ArrayLike | None
     pixelSize: float | Sequence[float] | None
     heightMap: bool
     depthFactor: float
+    invalid: float | Sequence[float | Sequence[float]] | None
+    origin: Sequence[float] | None
     noise: NoiseModel | float | np.ndarray | None
     tolerance: float
     smoothAngle: float
@@ -65,10 +75,13 @@ class GrowingOptions(TypedDict, total=False):
 
 
 class SegmentingOptions(TypedDict, total=False):
-    K: ArrayLike | None
+    K: ArrayLike | str | os.PathLike[str] | None
+    distCoeffs: ArrayLike | None
     pixelSize: float | Sequence[float] | None
     heightMap: bool
     depthFactor: float
+    invalid: float | Sequence[float | Sequence[float]] | None
+    origin: Sequence[float] | None
     noise: NoiseModel | float | np.ndarray | None
     minDistance: float
     separation: float
@@ -78,10 +91,13 @@ class SegmentingOptions(TypedDict, total=False):
 
 
 class ClosingOptions(TypedDict, total=False):
-    K: ArrayLike | None
+    K: ArrayLike | str | os.PathLike[str] | None
+    distCoeffs: ArrayLike | None
     pixelSize: float | Sequence[float] | None
     heightMap: bool
     depthFactor: float
+    invalid: float | Sequence[float | Sequence[float]] | None
+    origin: Sequence[float] | None
     noise: NoiseModel | float | np.ndarray | None
     tolerance: float
     share: float
@@ -145,16 +161,34 @@ class Accessors:
     def getK(self) -> np.ndarray | None:
         """getK() -> retval
 
-        Camera matrix; the values of `src` are then depths along the optical axis.
+        Camera; the values of `src` are then depths along the optical axis. (fx, fy, cx, cy), 3x3, 3x4, 9 numbers by
+        rows, or the name of a file of one (YAML, JSON or XML of cv2, ROS, Open3D or librealsense, text, NPY, NPZ),
+        whose distortion replaces `distCoeffs`.
         """
         return self._params.K  # type: ignore[return-value]
 
-    def setK(self, K: ArrayLike | None, /) -> None:
+    def setK(self, K: ArrayLike | str | os.PathLike[str] | None, /) -> None:
         """setK(K) -> None
 
-        Camera matrix; the values of `src` are then depths along the optical axis.
+        Camera; the values of `src` are then depths along the optical axis. (fx, fy, cx, cy), 3x3, 3x4, 9 numbers by
+        rows, or the name of a file of one (YAML, JSON or XML of cv2, ROS, Open3D or librealsense, text, NPY, NPZ),
+        whose distortion replaces `distCoeffs`.
         """
         self._set("K", K)
+
+    def getDistCoeffs(self) -> np.ndarray | None:
+        """getDistCoeffs() -> retval
+
+        Distortion of the lens with `K`, as cv2 has it: (k1, k2, p1, p2[, k3[, k4, k5, k6[, ...]]]).
+        """
+        return self._params.distCoeffs  # type: ignore[return-value]
+
+    def setDistCoeffs(self, distCoeffs: ArrayLike | None, /) -> None:
+        """setDistCoeffs(distCoeffs) -> None
+
+        Distortion of the lens with `K`, as cv2 has it: (k1, k2, p1, p2[, k3[, k4, k5, k6[, ...]]]).
+        """
+        self._set("distCoeffs", distCoeffs)
 
     def getPixelSize(self) -> tuple[float, float] | None:
         """getPixelSize() -> retval
@@ -197,6 +231,42 @@ class Accessors:
         Divides integer values: 1000 makes metres of millimetres. Integer 0 is invalid.
         """
         self._set("depthFactor", depthFactor)
+
+    def getInvalid(self) -> tuple[tuple[float, float], ...] | None:
+        """getInvalid() -> retval
+
+        What `src` holds where there is no data, as stored there: a value; several, (0, 65535); and ranges, which are
+        pairs among them with both ends included: [(8, inf)] leaves out 8 and more, [-9999, (8, inf)] both. () says that
+        every finite value is one. A point is left out whose coordinates all have the value, or whose third coordinate
+        lies in the range.
+        """
+        return self._params.invalid  # type: ignore[return-value]
+
+    def setInvalid(self, invalid: float | Sequence[float | Sequence[float]] | None, /) -> None:
+        """setInvalid(invalid) -> None
+
+        What `src` holds where there is no data, as stored there: a value; several, (0, 65535); and ranges, which are
+        pairs among them with both ends included: [(8, inf)] leaves out 8 and more, [-9999, (8, inf)] both. () says that
+        every finite value is one. A point is left out whose coordinates all have the value, or whose third coordinate
+        lies in the range.
+        """
+        self._set("invalid", invalid)
+
+    def getOrigin(self) -> tuple[float, float, float] | None:
+        """getOrigin() -> retval
+
+        Where points were seen from, in their own frame. None: (0, 0, 0) where their rays meet there, else the place
+        that the rows and columns tell.
+        """
+        return self._params.origin  # type: ignore[return-value]
+
+    def setOrigin(self, origin: Sequence[float] | None, /) -> None:
+        """setOrigin(origin) -> None
+
+        Where points were seen from, in their own frame. None: (0, 0, 0) where their rays meet there, else the place
+        that the rows and columns tell.
+        """
+        self._set("origin", origin)
 
     def getNoise(self) -> NoiseModel | float | np.ndarray | None:
         """getNoise() -> retval

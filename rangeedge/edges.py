@@ -15,6 +15,7 @@ from .constants import EDGE_BOUNDARY, EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, EDGE
 from .frame import Frame
 from .noise import measured_frame
 from .options import SCAN_LINES, ScanLineParams
+from .sectors import sectors_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -274,20 +275,43 @@ def edgePoints(
 def measure_strength(frame: Frame, params: ScanLineParams) -> EdgeStrength:
     """Edge strengths of a checked range image."""
     strength = no_strength(frame.shape)
-    _core.edge_strength(frame.kernel, kernel_options(frame, params), frame.threads, *strength)
+    parts = sectors_of(frame)
+    for part in parts:
+        for whole, own in zip(strength, measure_strength(part.frame, params), strict=True):
+            part.put(whole, own)
+    if not parts:
+        _core.edge_strength(frame.kernel, kernel_options(frame, params), frame.threads, *strength)
     return strength
 
 
 def measure_points(frame: Frame, params: ScanLineParams) -> np.ndarray:
     """Edge points of a checked range image."""
+    parts = sectors_of(frame)
+    if parts:
+        return _joined([part.points(measure_points(part.frame, params)) for part in parts])
     return _points(_core.edge_candidates(frame.kernel, kernel_options(frame, params), frame.threads))
 
 
 def measure_both(frame: Frame, params: ScanLineParams) -> tuple[EdgeStrength, np.ndarray]:
     """Edge strengths and edge points of a checked range image, of one approximation of its scan lines."""
     strength = no_strength(frame.shape)
+    parts = sectors_of(frame)
+    if parts:
+        points = []
+        for part in parts:
+            own, found = measure_both(part.frame, params)
+            points.append(part.points(found))
+            for whole, values in zip(strength, own, strict=True):
+                part.put(whole, values)
+        return strength, _joined(points)
     found = _core.edge_strength_and_candidates(frame.kernel, kernel_options(frame, params), frame.threads, *strength)
     return strength, _points(found)
+
+
+def _joined(parts: list[np.ndarray]) -> np.ndarray:
+    """Edge points of sectors, by direction."""
+    points = np.concatenate(parts)
+    return points[np.argsort(points["direction"], kind="stable")]
 
 
 def _points(candidates: dict[str, np.ndarray]) -> np.ndarray:

@@ -10,12 +10,14 @@ import cv2
 import numpy as np
 
 from . import _core
-from ._check import array, described, error, fail, image8
+from ._check import described, error, fail, image8
+from .forms import SRC, range_array
 from .noise_model import WHITE, NoiseModel
 from .options import ScanLineParams
+from .plausible import warn_of_dropped
+from .viewpoint import distorted_rays, view_of
 
 _THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
-SRC = "a depth image of shape (H, W), or points of shape (H, W, 3) or (H, W, 4)"
 
 
 def threads_worth(pixels: int) -> int:
@@ -27,11 +29,13 @@ def threads_worth(pixels: int) -> int:
 class Frame:
     """A range image as the kernels take it: invalid pixels are NaN, ordinates grow toward the viewer.
 
-    `samples` holds inverse depth (`projective`) or height of shape (H, W), or points of shape (H, W, 3). `to_plane`
-    takes (column, row, 1) to normalised image coordinates or to lengths; `axis` is the viewing direction; `heightMap`
-    says that heights grow toward the viewer in the image, too; `spaced` that the spacing of pixels is known in the unit
-    of the values, which on a grid 1 does not say. `step` is the length to whose multiples the values were rounded, 0 if
-    none is known. `noise` is a model or a map of deviations.
+    `samples` holds inverse depth (`projective`) or height of shape (H, W), or points of shape (H, W, 3).
+    `to_plane` takes (column, row, 1) to normalised image coordinates or to lengths; `axis` is the viewing direction;
+    `heightMap` says that heights grow toward the viewer in the image, too; `spaced` that the spacing of pixels is known
+    in the unit of the values, which on a grid 1 does not say. `step` is the length to whose multiples the values were rounded, 0 if none is known.
+    `curved` says that the rays of a scan line need not lie in a plane, `ranges` that depths are measured along the rays
+    and not along `axis`; `origin` is the viewpoint in the frame in which points came, and zero in that of `samples`.
+    `noise` is a model or a map of deviations.
     """
 
     samples: np.ndarray
@@ -41,6 +45,9 @@ class Frame:
     heightMap: bool = False
     spaced: bool = True
     step: float = 0.0
+    curved: bool = False
+    ranges: bool = False
+    origin: tuple[float, float, float] = (0.0, 0.0, 0.0)
     noise: NoiseModel | np.ndarray | None = None
 
     @property
@@ -57,6 +64,8 @@ class Frame:
         """Inverse depth or height of every pixel, NaN where invalid."""
         if self.samples.ndim == 2:
             return self.samples
+        if self.ranges:
+            return 1 / np.linalg.norm(self.samples, axis=2)
         along = self.samples @ np.asarray(self.axis, self.samples.dtype)
         if not self.projective:
             return -along
@@ -77,7 +86,7 @@ class Frame:
     def points(self) -> np.ndarray:
         """(H, W, 3) coordinates of every pixel, NaN where invalid."""
         if self.samples.ndim == 3:
-            return self.samples.astype(np.float64)
+            return self.samples + np.asarray(self.origin, np.float64)
         v, u = np.indices(self.shape)
         a, b, c, d, e, f = self.to_plane
         x, y = a * u + b * v + c, d * u + e * v + f
@@ -138,26 +147,58 @@ class Frame:
             noise = _core.Noise(0.0, 0.0, 0.0, WHITE, self.noise)
         else:
             noise = _core.Noise(self.noise.a, self.noise.b, self.noise.c, self.noise.of_fits())
-        return _core.Frame(self.samples, self.projective, self.to_plane, self.axis, noise)
+        return _core.Frame(self.samples, self.projective, self.to_plane, self.axis, self.curved, self.ranges, noise)
 
 
 def read_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None = None) -> Frame:
     """Bring a range image to the form that kernels take; its noise comes later."""
-    src = array("src", src, SRC, ndim=(2, 3))
-    K, pixelSize, heightMap = params.K, params.pixelSize, params.heightMap
+    src, seen = checked(src, params)
+    if mask is not None:
+        inside = image8("mask", mask, src.shape[:2]) != 0
+        seen = inside if seen is None else seen & inside
+    if params.invalid is not None:
+        found = _holds(src, params.invalid)
+        if found.any():
+            seen = ~found if seen is None else seen & ~found
+    if src.ndim == 3:
+        return _points(src, seen, params)
+    if params.K is not None:
+        return _pinhole(src, seen, params)
+    return _grid(src, seen, params)
+
+
+def checked(src: np.ndarray, params: ScanLineParams) -> tuple[np.ndarray, np.ndarray | None]:
+    """A range image as an array, and where it is not masked; options that fit neither it nor each other are refused."""
+    src, seen = range_array(src)
+    points = src.ndim == 3
+    if points and (src.shape[2] not in (3, 4) or src.dtype.kind != "f"):
+        raise fail("src", SRC + ", points being floats", described(src), cv2.Error.StsUnsupportedFormat)
+    if src.dtype.kind == "b":
+        raise fail("src", SRC + " of numbers", described(src), cv2.Error.StsUnsupportedFormat)
+    K, pixelSize = params.K, params.pixelSize
     if K is not None and pixelSize is not None:
         raise fail("pixelSize", "None where K is given", described(pixelSize))
-    if K is not None and heightMap:
-        raise fail("heightMap", "False where K is given (its values are depths)", heightMap)
-    inside = None if mask is None else image8("mask", mask, src.shape[:2]) != 0
-    if src.ndim == 3:
-        for name in ("K", "pixelSize"):
-            if getattr(params, name) is not None:
-                raise fail(name, "None where src holds points", described(getattr(params, name)))
-        return _points(src, inside, heightMap)
-    if K is not None:
-        return _pinhole(src, params.depthFactor, inside, K)
-    return _grid(src, params.depthFactor, inside, pixelSize, heightMap)
+    if K is not None and params.heightMap:
+        raise fail("heightMap", "False where K is given (its values are depths)", params.heightMap)
+    if K is None and params.distCoeffs is not None:
+        raise fail("distCoeffs", "None where K is not given", described(params.distCoeffs))
+    for name in ("K", "pixelSize") if points else ("origin",):
+        if getattr(params, name) is not None:
+            form = "points" if points else "no points"
+            raise fail(name, f"None where src holds {form}", described(getattr(params, name)))
+    if params.origin is not None and params.heightMap:
+        raise fail("origin", "None where heightMap is given (its lines of sight are parallel)", params.origin)
+    return src, seen
+
+
+def _holds(src: np.ndarray, ranges: tuple[tuple[float, float], ...]) -> np.ndarray:
+    """Where the image holds a value of these ranges; single values are compared in the type of the image."""
+    found = np.zeros(src.shape[:2], bool)
+    for low, high in ranges:
+        values = src if src.ndim == 2 or low == high else src[..., 2]
+        inside = values == low if low == high else (values >= low) & (values <= high)
+        found |= inside if inside.ndim == 2 else inside[..., :3].all(axis=2)
+    return found
 
 
 def _lengths(src: np.ndarray, depthFactor: float, heightMap: bool = False) -> np.ndarray:
@@ -167,8 +208,6 @@ def _lengths(src: np.ndarray, depthFactor: float, heightMap: bool = False) -> np
     """
     if src.dtype.kind == "f":
         return np.ascontiguousarray(src, dtype=np.float64 if src.dtype.itemsize > 4 else np.float32)
-    if src.dtype.kind == "b":
-        raise fail("src", SRC + " of numbers", described(src), cv2.Error.StsUnsupportedFormat)
     real = np.float32 if src.dtype.itemsize <= 2 else np.float64
     lengths = np.divide(src, real(depthFactor), dtype=real, order="C")
     lengths[src <= (np.iinfo(src.dtype).min if heightMap else 0)] = np.nan
@@ -180,79 +219,52 @@ def _step(src: np.ndarray, depthFactor: float) -> float:
     return 1 / depthFactor if src.dtype.kind in "iu" else 0.0
 
 
-def _pinhole(src: np.ndarray, depthFactor: float, inside: np.ndarray | None, K: np.ndarray) -> Frame:
+def _pinhole(src: np.ndarray, seen: np.ndarray | None, params: ScanLineParams) -> Frame:
     # The kernel divides by the factor what depth cameras give; other integers are divided here.
-    depth = np.ascontiguousarray(src) if src.dtype == np.uint16 else _lengths(src, depthFactor)
+    factor, K = params.depthFactor, params.K
+    depth = np.ascontiguousarray(src) if src.dtype == np.uint16 else _lengths(src, factor)
     inverse = np.empty(depth.shape, np.float32 if depth.dtype == np.uint16 else depth.dtype)
-    _core.invert_depth(depth, depthFactor, None if inside is None else inside.view(np.uint8), inverse)
-    return Frame(inverse, True, tuple(np.linalg.inv(K)[:2].ravel().tolist()), step=_step(src, depthFactor))
+    _core.invert_depth(depth, factor, None if seen is None else seen.view(np.uint8), inverse)
+    if params.distCoeffs is None or not params.distCoeffs.any():
+        return Frame(inverse, True, tuple(np.linalg.inv(K)[:2].ravel().tolist()), step=_step(src, factor))
+    rays = distorted_rays(K, params.distCoeffs, depth.shape).astype(inverse.dtype)
+    return Frame(rays / inverse[..., None], True, curved=True, step=_step(src, factor))
 
 
-def _grid(
-    src: np.ndarray,
-    depthFactor: float,
-    inside: np.ndarray | None,
-    pixelSize: tuple[float, float] | None,
-    heightMap: bool,
-) -> Frame:
-    values = _lengths(src, depthFactor, heightMap)
+def _grid(src: np.ndarray, seen: np.ndarray | None, params: ScanLineParams) -> Frame:
+    heightMap, pixelSize = params.heightMap, params.pixelSize
+    values = _lengths(src, params.depthFactor, heightMap)
     height = values if heightMap else -values
     infinite = np.isinf(height)
     if infinite.any():
         height = np.where(infinite, height.dtype.type(np.nan), height)
-    if inside is not None:
+    if seen is not None:
         height = height.copy() if np.shares_memory(height, src) else height
-        height[~inside] = np.nan
+        height[~seen] = np.nan
     dx, dy = pixelSize or (1.0, 1.0)
-    to_plane, spaced = (dx, 0.0, 0.0, 0.0, dy, 0.0), (dx, dy) != (1.0, 1.0)
-    return Frame(height, False, to_plane, heightMap=heightMap, spaced=spaced, step=_step(src, depthFactor))
+    frame = Frame(height, False, (dx, 0.0, 0.0, 0.0, dy, 0.0), heightMap=heightMap, spaced=(dx, dy) != (1.0, 1.0))
+    return replace(frame, step=_step(src, params.depthFactor))
 
 
-def _points(src: np.ndarray, inside: np.ndarray | None, heightMap: bool) -> Frame:
-    if src.shape[2] not in (3, 4) or src.dtype.kind != "f":
-        raise fail("src", SRC + ", points being floats", described(src), cv2.Error.StsUnsupportedFormat)
+def _points(src: np.ndarray, seen: np.ndarray | None, params: ScanLineParams) -> Frame:
     dtype = np.float64 if src.dtype.itemsize > 4 else np.float32
     points = np.array(src[..., :3], dtype=dtype, order="C")
     # Three zeros are what cameras write where they see nothing.
     points[~np.isfinite(points).all(axis=2) | (points == 0).all(axis=2)] = np.nan
-    if inside is not None:
-        points[~inside] = np.nan
-    if heightMap:
+    if seen is not None:
+        points[~seen] = np.nan
+    if params.heightMap:
         return Frame(points, False, axis=(0.0, 0.0, -1.0), heightMap=True)
-    central = points[np.isfinite(points[..., 2])].astype(np.float64)
-    if not len(central) or not _is_projective(points):
+    view = view_of(points, params.origin)
+    if any(view.origin):
+        points = (src[..., :3] - np.asarray(view.origin)).astype(dtype) * np.where(np.isnan(points), np.nan, 1)
+        points = np.ascontiguousarray(points, dtype)
+    if not view.projective:
         return Frame(points, False)
-    axis = _viewing_axis(central)
+    if view.ranges:
+        return Frame(points, True, axis=view.axis, curved=True, ranges=True, origin=view.origin)
+    count = np.count_nonzero(np.isfinite(points[..., 0]))
     with np.errstate(invalid="ignore"):
-        points[~(points @ np.asarray(axis, dtype) > 0)] = np.nan
-    return Frame(points, True, axis=axis)
-
-
-def _viewing_axis(points: np.ndarray) -> tuple[float, ...]:
-    """The z axis where all points lie before it, else the mean of their rays."""
-    if points[:, 2].min() > 0:
-        return 0.0, 0.0, 1.0
-    axis = (points / np.linalg.norm(points, axis=1, keepdims=True)).mean(axis=0)
-    length = np.linalg.norm(axis)
-    return tuple((axis / length).tolist()) if length > 0.1 else (0.0, 0.0, 1.0)
-
-
-def _is_projective(points: np.ndarray) -> bool:
-    """Whether rows and columns lie in planes through the origin rather than in planes along the z axis."""
-    z = np.array([0.0, 0.0, 1.0])
-    through_origin, along_axis = [], []
-    height, width = points.shape[:2]
-    lines = [points[v] for v in np.unique(np.linspace(0, height - 1, 16).astype(int))]
-    lines += [points[:, u] for u in np.unique(np.linspace(0, width - 1, 16).astype(int))]
-    for line in lines:
-        line = line[np.isfinite(line[:, 0])].astype(np.float64)
-        if len(line) < 3:
-            continue
-        for normal, found in (
-            (np.cross(line[0], line[-1]), through_origin),
-            (np.cross(z, line[-1] - line[0]), along_axis),
-        ):
-            length = np.linalg.norm(normal)
-            offset = (line - line[0]) @ normal
-            found.append(np.sqrt(np.mean(offset**2)) / length if length > 0 else 0.0)
-    return not along_axis or np.median(through_origin) <= np.median(along_axis)
+        points[~(points @ np.asarray(view.axis, dtype) > 0)] = np.nan
+    warn_of_dropped(count, np.count_nonzero(np.isfinite(points[..., 0])))
+    return Frame(points, True, axis=view.axis, origin=view.origin)

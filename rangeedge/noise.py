@@ -8,9 +8,11 @@ import numpy as np
 
 from . import _core
 from ._option import parsed, takes
+from .forms import range_array
 from .frame import Frame, read_frame
 from .noise_model import NoiseModel, correlation_of
 from .options import GEOMETRY, ScanLineParams
+from .plausible import question_geometry, warn_of_thresholds
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -66,13 +68,21 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
     0.003
     """
     (params,) = parsed(options, ScanLineParams)
-    return estimated(read_frame(src, params, mask))
+    return estimated(_plausible_frame(src, params, mask))
 
 
 def measured_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None = None) -> Frame:
     """A range image in the form that kernels take, with its noise: as given, else as estimated."""
-    frame = read_frame(src, params, mask)
+    frame = _plausible_frame(src, params, mask)
+    warn_of_thresholds(frame, eps=params.eps, noise=params.noise)
     return frame.with_noise(estimated(frame) if params.noise is None else params.noise)
+
+
+def _plausible_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None) -> Frame:
+    """A range image in the form that kernels take, and a word where it can hardly be what the options say."""
+    frame = read_frame(src, params, mask)
+    question_geometry(range_array(src)[0], frame, params)
+    return frame
 
 
 def estimated(frame: Frame) -> NoiseModel:

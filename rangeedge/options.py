@@ -8,6 +8,7 @@ flags of the command line, and what a detector saves: every field of `ScanLinePa
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -49,6 +50,10 @@ def _one_of(constants: Mapping[str, int]) -> Check:
 
 def _camera(name: str, value: Any) -> np.ndarray:
     return _read_only(_check.camera_matrix(name, value))
+
+
+def _distortion(name: str, value: Any) -> np.ndarray:
+    return _read_only(_check.distortion(name, value))
 
 
 def _noise(name: str, value: Any) -> NoiseModel | float | np.ndarray:
@@ -110,6 +115,14 @@ class ScanLineParams(Options):
     ScanLineParams(noise=0.002, maxGap=4)
     """
 
+    @_check.named("ScanLineParams")
+    def __post_init__(self) -> None:
+        if isinstance(self.K, (str, os.PathLike)):
+            camera = _check.camera_file("K", self.K)
+            object.__setattr__(self, "K", camera.K)
+            object.__setattr__(self, "distCoeffs", camera.distCoeffs)
+        super().__post_init__()
+
     eps: float | None = option(
         None,
         _or_none(_real(0, above=True)),
@@ -125,16 +138,29 @@ class ScanLineParams(Options):
         "Splitting tolerance in standard deviations of the noise.",
         group="scan lines",
     )
-    K: ArrayLike | None = option(
+    K: ArrayLike | str | os.PathLike[str] | None = option(
         None,
         _or_none(_camera),
-        "array_like of shape (3, 3) or None",
-        "Camera matrix; the values of `src` are then depths along the optical axis.",
+        "array_like or path or None",
+        "Camera; the values of `src` are then depths along the optical axis. (fx, fy, cx, cy), 3x3, 3x4, 9 numbers by"
+        " rows, or the name of a file of one (YAML, JSON or XML of cv2, ROS, Open3D or librealsense, text, NPY, NPZ),"
+        " whose distortion replaces `distCoeffs`.",
         group="geometry",
         kept="np.ndarray | None",
         read=_parse.camera,
-        metavar="FX,FY,CX,CY",
-        flagged="pinhole camera, in pixels; values are depths",
+        metavar="FX,FY,CX,CY|FILE",
+        flagged="pinhole camera, in pixels, or a file of one (YAML, JSON, ...); values are depths",
+    )
+    distCoeffs: ArrayLike | None = option(
+        None,
+        _or_none(_distortion),
+        "array_like of 4, 5, 8, 12 or 14 numbers or None",
+        "Distortion of the lens with `K`, as cv2 has it: (k1, k2, p1, p2[, k3[, k4, k5, k6[, ...]]]).",
+        group="geometry",
+        kept="np.ndarray | None",
+        read=_parse.distortion,
+        metavar="K1,K2,P1,P2[,...]",
+        flagged="distortion of the lens, with -K, as cv2 has it (default: none, or that of the camera's file)",
     )
     pixelSize: float | Sequence[float] | None = option(
         None,
@@ -160,6 +186,32 @@ class ScanLineParams(Options):
         "float",
         "Divides integer values: 1000 makes metres of millimetres. Integer 0 is invalid.",
         group="geometry",
+    )
+    invalid: float | Sequence[float | Sequence[float]] | None = option(
+        None,
+        _or_none(_check.invalid_values),
+        "float or sequence of floats and pairs or None",
+        "What `src` holds where there is no data, as stored there: a value; several, (0, 65535); and ranges, which are"
+        " pairs among them with both ends included: [(8, inf)] leaves out 8 and more, [-9999, (8, inf)] both."
+        " () says that every finite value is one. A point is left out whose coordinates all have the value, or whose"
+        " third coordinate lies in the range.",
+        group="geometry",
+        kept="tuple[tuple[float, float], ...] | None",
+        read=_parse.invalid_values,
+        metavar="V|LOW:HIGH[,...]",
+        flagged="values as stored, and ranges of them, that are no data: --invalid=-9999 or 0,8000:inf",
+    )
+    origin: Sequence[float] | None = option(
+        None,
+        _or_none(_check.point),
+        "(float, float, float) or None",
+        "Where points were seen from, in their own frame. None: (0, 0, 0) where their rays meet there, else the place"
+        " that the rows and columns tell.",
+        group="geometry",
+        kept="tuple[float, float, float] | None",
+        read=_parse.point,
+        metavar="X,Y,Z",
+        flagged="where points were seen from, in their own frame (default: that of the file, else found)",
     )
     noise: NoiseModel | float | np.ndarray | None = option(
         None,

@@ -42,6 +42,9 @@ def another(name, default):
         "jumpThreshold": 0.1 + 0.7,
         "noise": NoiseModel(1e-3, -1e-4, 1.425e-3, correlation=1.7),
         "minSignificance": 1e-300,
+        "distCoeffs": np.array([0.1, -0.2 / 3, 1e-3, 0, 0.01]),
+        "invalid": ((-9999.0, -9999.0), (8.1, np.inf)),
+        "origin": (0.1, -2.0, 1 / 3),
     }
     if name in special:
         return special[name]
@@ -373,7 +376,7 @@ def test_only_parameters_make_a_detector(params):
 
 
 @pytest.mark.parametrize(
-    "options", [{"K": np.eye(4)}, {"noise": -1}, {"noise": np.ones((2, 2), bool)}, {"pixelSize": (1, 2, 3)}]
+    "options", [{"K": np.ones((3, 3))}, {"noise": -1}, {"noise": np.ones((2, 2), bool)}, {"pixelSize": (1, 2, 3)}]
 )
 def test_parameters_that_wait_for_an_image_are_checked_at_once(options):
     name = next(iter(options))

@@ -145,7 +145,8 @@ def test_eps_is_the_tolerance_of_splitting():
     z = np.where(np.arange(40) < 20, 1.25, 1.0) * np.ones((30, 1))
     options = dict(noise=0.001, mergeSignificance=0.0, minSignificance=0.0)
     assert edgeStrength(z, 0.1, **options).jump.any()
-    assert not edgeStrength(z, 0.3, **options).jump.any()
+    with pytest.warns(rangeedge.RangeEdgeWarning, match="eps=0.3 exceeds the range of depths"):
+        assert not edgeStrength(z, 0.3, **options).jump.any()
     assert edgeStrength(z, epsFactor=100.0, **options).jump.any()
     assert not edgeStrength(z, epsFactor=300.0, **options).jump.any()
     assert not edgeStrength(z, noise=0.2).jump.any()

@@ -290,12 +290,6 @@ def test_points_left_out_do_not_turn_the_viewing_axis():
         assert edgeStrength(src, noise=0.001, mask=inside).jump.max() == pytest.approx(expected, rel=1e-6)
 
 
-def test_masked_arrays_are_refused():
-    heights = np.ma.masked_equal(np.arange(400.0).reshape(20, 20), 7)
-    with pytest.raises(rangeedge.error, match=r"edgeStrength: `src` must be .* got a masked array"):
-        edgeStrength(heights, heightMap=True)
-
-
 def test_whole_heights_may_be_negative():
     heights = np.arange(-200, 200, dtype=np.int16).reshape(20, 20)
     heights[3, 4] = -32768

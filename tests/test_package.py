@@ -20,8 +20,8 @@ import rangeedge
 from rangeedge import _core
 
 PUBLIC = """
-    error RangeImage imreadRange imwriteRange backproject project NoiseModel estimateNoise ScanLineParams splitScanLine
-    EdgeStrength edgeStrength edgePoints kindNames flyingPixels strengthImage overallStrength selectEdges thinEdges
+    error RangeEdgeWarning RangeImage imreadRange imwriteRange backproject project NoiseModel estimateNoise
+    ScanLineParams splitScanLine EdgeStrength edgeStrength edgePoints kindNames flyingPixels strengthImage overallStrength selectEdges thinEdges
     detectEdges detectEdgesWithStrength
     ScanLineDetector createScanLineDetector EdgeChain EdgeChains linkEdges
     Segments fitSegments writeLines closeContours

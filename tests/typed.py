@@ -25,6 +25,7 @@ HEAD = '''"""The options as editors and type checkers know them, by ``python tes
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, TypedDict
 

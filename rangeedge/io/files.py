@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from .. import _check
-from ..frame import read_frame
+from ..frame import checked
 from ..options import ScanLineParams
 from .arrays import read_npy, read_npz, write_npy, write_npz
 from .ascii_grid import is_ascii_grid, read_ascii_grid
@@ -117,7 +117,7 @@ def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None)
         image = found if isinstance(found, RangeImage) else RangeImage(found)
         image = image._replace(src=_range_image(image.src))
         if image.geometry:
-            read_frame(image.src[:1, :1], ScanLineParams(**image.geometry))  # whether they fit
+            checked(image.src[:1, :1], ScanLineParams(**image.geometry))  # whether they fit
         return image
 
 
@@ -179,7 +179,7 @@ def imwriteRange(
     name = file_name(path)
     given = {"K": K, "pixelSize": pixelSize, "heightMap": heightMap, "depthFactor": depthFactor}
     given = {key: value for key, value in given.items() if value is not None}
-    read_frame(src, ScanLineParams(**given))
+    src, _ = checked(src, ScanLineParams(**given))
     suffix = Path(name).suffix.lower()
     if suffix not in _WRITERS:
         raise _check.fail("path", f"a file name with one of the suffixes {' '.join(_WRITERS)}", repr(name))

@@ -43,7 +43,9 @@ def read_pcd(data: bytes) -> RangeImage:
     if encoding not in decode:
         raise ValueError(f"unknown DATA {encoding!r}")
     points = points_of(decode[encoding](data, start, layout, width * height))
-    return RangeImage(points.reshape(height, width, 3), viewpoint=_viewpoint(header))
+    viewpoint = _viewpoint(header)
+    geometry = {"origin": viewpoint[:3]} if viewpoint is not None and any(viewpoint[:3]) else {}
+    return RangeImage(points.reshape(height, width, 3), geometry, viewpoint=viewpoint)
 
 
 def write_pcd(points: np.ndarray) -> bytes:

@@ -119,7 +119,7 @@ private:
         const double x = edge.abscissa;
         const EdgeSide f1 = options_.endpoint ? from_endpoint(line, f, edge.before, x) : at_position(line, f, x);
         const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_position(line, g, x);
-        double jump = edge.intersects ? 0 : jump_strength(line, f1, f2);
+        double jump = edge.intersects ? 0 : jump_strength(line, x, f1, f2);
         if (jump > 0) jump = std::min(jump, largest_jump(line, edge.before, edge.after));
         double crease = crease_strength(f1, f2);
 
@@ -152,8 +152,8 @@ private:
             c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
         if (crease > 0) c.kind |= is_convex(f1, f2) ? convex_bit : concave_bit;
         locate(c, line, edge);
-        c.sides[0] = side(line, f1, slope1.single);
-        c.sides[1] = side(line, f2, slope2.single);
+        c.sides[0] = side(line, x, f1, slope1.single);
+        c.sides[1] = side(line, x, f2, slope2.single);
         return c;
     }
 
@@ -165,13 +165,28 @@ private:
         c.before = static_cast<std::int32_t>(line.pixel(edge.before));
         c.after = static_cast<std::int32_t>(line.pixel(edge.after));
         const double w = line.start + line.step * edge.abscissa, *d = line.direction;
+        if (line.curved) {
+            const PlaneImage image(line.rays, w);
+            for (int i = 0; i < 2; ++i) {
+                c.plane_direction[i] = static_cast<float>(image.direction[i]);
+                c.plane_position[i] = static_cast<float>(image.position[i]);
+            }
+            return;
+        }
         for (int i = 0; i < 2; ++i) c.plane_direction[i] = static_cast<float>(d[i]);
         c.plane_position[0] = static_cast<float>(w * d[0] - line.offset * d[1]);
         c.plane_position[1] = static_cast<float>(w * d[1] + line.offset * d[0]);
     }
 
-    static Side side(const Line<T>& line, const EdgeSide& f, double slope_deviation) {
+    static Side side(const Line<T>& line, double x, const EdgeSide& f, double slope_deviation) {
         const double deviation = slope_deviation * line.per_step;
+        if (line.curved) {
+            const PlaneImage image(line.rays, line.start + line.step * x);
+            const double seen = deviation * image.by_slope;
+            return {static_cast<float>(image.by_value * f.ordinate),
+                    static_cast<float>(image.slope(f.ordinate, f.slope * line.per_step)),
+                    std::min(static_cast<float>(seen * seen), endless)};
+        }
         return {static_cast<float>(f.ordinate), static_cast<float>(f.slope * line.per_step),
                 std::min(static_cast<float>(deviation * deviation), endless)};
     }

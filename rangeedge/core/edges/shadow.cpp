@@ -35,7 +35,7 @@ ShadowStep step_across_shadow(const Line<T>& line, const Fit& f, const Fit& g, i
     const double below = Extension(far, x_far, x_near).upper;
     if (line.frame->projective && !(std::min({end, beyond, below}) > 0)) return {};
     if (spaced && line.grazing_angle(before, after) > veil) return {};
-    step.jump = std::min(line.depth(beyond), line.depth(below)) - line.depth(end);
+    step.jump = std::min(line.depth(beyond, x_far), line.depth(below, x_near)) - line.depth(end, x_near);
     step.difference = end - std::max(beyond, below);
     if (!spaced) step.difference = std::min(step.difference, Extension(near, x_near, x_far).lower - beyond);
     const FitDeviation deviation = jump_deviation(value_deviation(*line.noise, line.noise_at(before).of_fit(f.samples),

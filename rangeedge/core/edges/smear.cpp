@@ -29,7 +29,8 @@ double share_of_step(const Line<T>& line, const EndTangent& f, const EndTangent&
     const double x = line.abscissa(k), y1 = f.value(x), y2 = g.value(x);
     if (side * (y2 - y1) < 0 || (line.frame->projective && !(std::min(y1, y2) > 0))) return NAN;
     side = y2 - y1;
-    const double share = (line.depth(line.ordinate(k)) - line.depth(y1)) / (line.depth(y2) - line.depth(y1));
+    const double from = line.depth(y1, x), to = line.depth(y2, x);
+    const double share = (line.depth(line.ordinate(k), x) - from) / (to - from);
     const double slack = std::max(overshoot, line.tolerance_at(k) / std::abs(side));
     return share >= -slack && share <= 1 + slack ? share : NAN;
 }

@@ -56,7 +56,7 @@ template <class T>
 EdgeSide at_position(const Line<T>& line, const Curve& f, double x) {
     const double z = f.value(x), slope = f.slope(x);
     const Tangent tangent = line.tangent(x, z, slope);
-    return {z, slope, tangent, f.value_variance(x), f.slope_variance(x), line.angle_per_slope(tangent, z)};
+    return {z, slope, tangent, f.value_variance(x), f.slope_variance(x), line.angle_per_slope(tangent, x, z)};
 }
 
 // Second form: extrapolated to x from an end point, the sample k, z1 + f'(x1) (x - x1), on either side. Where the edge
@@ -70,13 +70,13 @@ EdgeSide from_endpoint(const Line<T>& line, const Curve& f, int k, double x) {
             tangent,
             f.value_variance(x1),
             f.slope_variance(x1),
-            line.angle_per_slope(tangent, z1)};
+            line.angle_per_slope(tangent, x1, z1)};
 }
 
 // |f1(x) - f2(x)|, a length.
 template <class T>
-double jump_strength(const Line<T>& line, const EdgeSide& f1, const EdgeSide& f2) {
-    return std::abs(line.depth(f1.ordinate) - line.depth(f2.ordinate));
+double jump_strength(const Line<T>& line, double x, const EdgeSide& f1, const EdgeSide& f2) {
+    return std::abs(line.depth(f1.ordinate, x) - line.depth(f2.ordinate, x));
 }
 
 // The difference of depths between the samples around an edge, two on either side where there are. No jump is larger:
@@ -86,7 +86,7 @@ double largest_jump(const Line<T>& line, int before, int after) {
     double nearest = HUGE_VAL, farthest = -HUGE_VAL;
     for (const int k : {before - 1, before, after, after + 1}) {
         if (k < 0 || k >= line.path.size) continue;
-        const double z = line.depth(line.ordinate(k));
+        const double z = line.depth(line.ordinate(k), line.abscissa(k));
         if (z < nearest) nearest = z;
         if (z > farthest) farthest = z;
     }

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "base/vector.hpp"
 #include "image/noise.hpp"
 
 namespace rangeedge {
@@ -22,8 +23,14 @@ struct Frame {
     bool projective;     // rays from one point; else parallel to `axis`
     double to_plane[6];  // pixel (u, v, 1) to normalised image coordinates, or to lengths on the grid
     double axis[3];      // direction of view in the frame of `points`
+    bool curved;         // whether the rays of a line of points need not lie in a plane
+    bool ranges;         // whether their depth is measured along the rays, not along `axis`
     Noise noise;
 
+    Vector point(std::int64_t pixel) const {
+        const T* p = points + 3 * pixel;
+        return {static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
+    }
     bool valid_at(int col, int row) const {
         if (col < 0 || row < 0 || col >= cols || row >= rows) return false;
         const std::int64_t i = static_cast<std::int64_t>(row) * cols + col;

@@ -37,7 +37,8 @@ struct BoundFrame {
 
     template <class T>
     BoundFrame(nb::ndarray<const T, nb::c_contig, nb::device::cpu> values, bool projective,
-               const std::array<double, 6>& to_plane, const std::array<double, 3>& axis, const BoundNoise& noise)
+               const std::array<double, 6>& to_plane, const std::array<double, 3>& axis, bool curved, bool ranges,
+               const BoundNoise& noise)
         : samples(values), map(noise.map) {
         const bool points = values.ndim() == 3;
         Frame<T> own{};
@@ -48,6 +49,8 @@ struct BoundFrame {
         own.projective = projective;
         std::copy(to_plane.begin(), to_plane.end(), own.to_plane);
         std::copy(axis.begin(), axis.end(), own.axis);
+        own.curved = curved;
+        own.ranges = ranges;
         own.noise = noise.noise;
         frame = own;
     }

@@ -41,7 +41,7 @@ void bind_estimate(nb::module_& m) {
 
 template <class T>
 using FrameInit = nb::init<nb::ndarray<const T, nb::c_contig, nb::device::cpu>, bool, const std::array<double, 6>&,
-                           const std::array<double, 3>&, const BoundNoise&>;
+                           const std::array<double, 3>&, bool, bool, const BoundNoise&>;
 
 }  // namespace
 
@@ -50,8 +50,10 @@ void bind_image(nb::module_& m) {
         .def(nb::init<double, double, double, const FitsArray&, Image<float>>(), "a"_a, "b"_a, "c"_a, "fits"_a,
              optional_array("map") = nb::none());
     nb::class_<BoundFrame>(m, "Frame", "A range image: ordinates (H, W) or points (H, W, 3), NaN without data.")
-        .def(FrameInit<float>(), array("samples"), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a)
-        .def(FrameInit<double>(), array("samples"), "projective"_a, "to_plane"_a, "axis"_a, "noise"_a);
+        .def(FrameInit<float>(), array("samples"), "projective"_a, "to_plane"_a, "axis"_a, "curved"_a, "ranges"_a,
+             "noise"_a)
+        .def(FrameInit<double>(), array("samples"), "projective"_a, "to_plane"_a, "axis"_a, "curved"_a, "ranges"_a,
+             "noise"_a);
     bind_inverse<float, float>(m);
     bind_inverse<double, double>(m);
     bind_inverse<std::uint16_t, float>(m);

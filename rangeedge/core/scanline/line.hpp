@@ -25,6 +25,11 @@
 //
 // Its angle phi changes with m by |dphi/dm| = |s r' - r s'| / (s^2 + r^2), primes for derivatives of the tangent's
 // coordinates by m, which is 1 / (s^2 + r^2) on the grid and kappa q / (s^2 + r^2) with a camera.
+//
+// Where the rays of a line do not lie in a plane (rays.hpp), its points are P(w) / y, and what is said of tangents holds
+// in the plane that touches the surface of the rays at w: with e = P / |P| and f = P' - (P' . e) e,
+//
+//     (ds/dw, dr/dw) ~ (|f| y, (P' . e) y - |P| m).
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cmath>
@@ -34,6 +39,7 @@
 
 #include "base/angle.hpp"
 #include "image/frame.hpp"
+#include "scanline/rays.hpp"
 #include "scanline/segment.hpp"
 
 namespace rangeedge {
@@ -70,15 +76,29 @@ struct Line {
     double start = 0, step = 1, per_step = 1;
     double direction[2] = {1, 0}, offset = 0;  // d and the distance along n in the plane of the image
     double kappa = 1;
+    bool curved = false;  // by `rays`, in the axes of the plane of the image and along the view
+    Rays rays{};
 
     double abscissa(int k) const { return x ? static_cast<double>(x[k]) : k; }
     double ordinate(int k) const { return static_cast<double>(y[k]); }
-    double depth(double ordinate) const { return frame->projective ? 1 / ordinate : -ordinate; }
+    // Inverse depths times this are ordinates.
+    double stretch(double abscissa) const {
+        if (!curved) return 1;
+        const Vector p = rays.at(start + step * abscissa);
+        return frame->ranges ? length(p) : p.z;
+    }
+    double depth(double ordinate, double abscissa) const {
+        return frame->projective ? stretch(abscissa) / ordinate : -ordinate;
+    }
     std::int64_t pixel(int k) const { return path.pixel(k, frame->cols); }
     // The noise of sample k, of the border between two samples, and of a segment.
     SampleNoise noise_at(int k) const {
-        const double q = ordinate(k);
         const std::int64_t p = pixel(k);
+        if (curved) {
+            const double by = stretch(abscissa(k)), q = ordinate(k) / by;
+            return {by * frame->noise.sigma(q, p, true), by * frame->noise.waves_at(q, p, true)};
+        }
+        const double q = ordinate(k);
         return {frame->noise.sigma(q, p, frame->projective), frame->noise.waves_at(q, p, frame->projective)};
     }
     SampleNoise noise_between(int i, int k) const { return mean(noise_at(i), noise_at(k)); }
@@ -89,24 +109,35 @@ struct Line {
     Tangent tangent(double abscissa, double value, double slope) const {
         const double m = slope * per_step;
         if (!frame->projective) return {1, -m};
+        if (curved) {
+            const double w = start + step * abscissa;
+            const Vector p = rays.at(w), turn = rays.slope(w);
+            const double reach = length(p), outward = dot(p, turn) / reach;
+            return {length(cross(p, turn)) / reach * value, outward * value - reach * m};
+        }
         return {value - (start + step * abscissa) * m, -kappa * m};
     }
     // The angle at which the line of sight meets the straight line from sample i to sample k, in degrees.
     double grazing_angle(int i, int k) const {
-        const Tangent a = point(i), b = point(k), way{b.s - a.s, b.r - a.r};
-        const Tangent sight = frame->projective ? Tangent{a.s + b.s, a.r + b.r} : Tangent{0, 1};
-        return angle_between(cross(way, sight), std::abs(dot(way, sight)));
+        if (!frame->projective) {
+            const double w = step * (abscissa(k) - abscissa(i)), r = ordinate(i) - ordinate(k);
+            return angle_between(w, std::abs(r));
+        }
+        const Vector a = point(i), b = point(k), way = combination(b, -1, a), sight = combination(a, 1, b);
+        return angle_between(length(rangeedge::cross(way, sight)), std::abs(rangeedge::dot(way, sight)));
     }
     // How fast the angle of that tangent changes with the slope.
-    double angle_per_slope(const Tangent& t, double value) const {
+    double angle_per_slope(const Tangent& t, double abscissa, double value) const {
+        if (curved) return t.s * length(rays.at(start + step * abscissa)) * per_step / dot(t, t);
         return (frame->projective ? kappa * value : 1) * per_step / dot(t, t);
     }
 
 private:
-    // The coordinates (s, r) of a sample.
-    Tangent point(int k) const {
-        const double w = start + step * abscissa(k), z = depth(ordinate(k));
-        return frame->projective ? Tangent{w * z, kappa * z} : Tangent{w, z};
+    // A sample in space, in the axes of its plane or in those of the rays.
+    Vector point(int k) const {
+        const double w = start + step * abscissa(k), far = 1 / ordinate(k);
+        const Vector p = curved ? rays.at(w) : Vector{w, 0, kappa};
+        return {p.x * far, p.y * far, p.z * far};
     }
 };
 

@@ -41,19 +41,11 @@ void inverse_of(const Deviation& tolerance, bool projective, const float* y, int
     invert_deviations(tolerance, projective, y, n, result);
 }
 
-struct Vector {
-    double x, y, z;
-};
-double dot(const Vector& a, const Vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-Vector cross(const Vector& a, const Vector& b) {
-    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
-Vector combination(const Vector& a, double k, const Vector& b) { return {a.x + k * b.x, a.y + k * b.y, a.z + k * b.z}; }
-bool normalise(Vector& a) {
-    const double length = std::sqrt(dot(a, a));
-    if (!(length > 0) || !std::isfinite(length)) return false;
-    a = {a.x / length, a.y / length, a.z / length};
-    return true;
+// A direction across the axis: that of x, where that is none along it.
+Vector across(const Vector& axis) {
+    Vector right{1, 0, 0};
+    right = combination(right, -dot(axis, right), axis);
+    return normalise(right) ? right : Vector{0, 1, 0};
 }
 
 }  // namespace
@@ -92,7 +84,14 @@ void LineReader<T>::read(int direction, int first, int count, Strip<T>& strip) c
     if (frame_.points) {
         strip.x.resize(size), strip.y.resize(size);
         for (Line<T>& line : strip.lines) {
-            read_points(line, strip.x.data() + used, strip.y.data() + used);
+            T *x = strip.x.data() + used, *y = strip.y.data() + used;
+            line.x = x, line.y = y;
+            std::fill_n(x, line.path.size, nan<T>);
+            std::fill_n(y, line.path.size, nan<T>);
+            if (frame_.curved)
+                read_curved(line, x, y);
+            else
+                read_points(line, x, y);
             used += static_cast<std::size_t>(line.path.size);
         }
     } else {
@@ -192,8 +191,19 @@ template <class T>
 void LineReader<T>::set_tolerance(Line<T>& line, T* scale) const {
     const Noise& noise = frame_.noise;
     const bool given = options_.eps > 0, mapped = noise.map && !given;
+    const int size = line.path.size;
     const double factor = given ? options_.eps : options_.eps_factor * line.noise->residual;
     const Deviation tolerance = given ? Deviation{factor} : noise.waves.times(factor);
+    if (line.curved && frame_.ranges) {
+        for (int k = 0; k < size; ++k) {
+            const double stretch = line.stretch(line.abscissa(k)), q = line.ordinate(k) / stretch;
+            const double own = mapped ? factor * static_cast<double>(noise.map[line.pixel(k)]) * q * q
+                                      : tolerance.of_ordinate(q, true);
+            scale[k] = static_cast<T>(1 / (stretch * std::max(own, Noise::finest)));
+        }
+        line.scale = scale;
+        return;
+    }
     // The same everywhere: a length on a grid, or one that grows with the square of the depth.
     const double other = frame_.projective ? tolerance.c0 : tolerance.c2;
     if (!mapped && other == 0 && tolerance.c1 == 0 && tolerance.c3 == 0) {
@@ -201,7 +211,6 @@ void LineReader<T>::set_tolerance(Line<T>& line, T* scale) const {
         return;
     }
     line.scale = scale;
-    const int size = line.path.size;
     if (!mapped) {
         inverse_of(tolerance, frame_.projective, line.y, size, scale);
         return;
@@ -218,17 +227,10 @@ void LineReader<T>::set_tolerance(Line<T>& line, T* scale) const {
 template <class T>
 void LineReader<T>::read_points(Line<T>& line, T* x, T* y) const {
     const Path& path = line.path;
-    const auto point = [&](int k) {
-        const T* p = frame_.points + 3 * path.pixel(k, frame_.cols);
-        return Vector{static_cast<double>(p[0]), static_cast<double>(p[1]), static_cast<double>(p[2])};
-    };
-    const auto valid = [](const Vector& p) { return std::isfinite(p.x) && std::isfinite(p.y) && std::isfinite(p.z); };
-    line.x = x, line.y = y;
-    std::fill_n(x, path.size, nan<T>);
-    std::fill_n(y, path.size, nan<T>);
+    const auto point = [&](int k) { return frame_.point(path.pixel(k, frame_.cols)); };
     int first = 0, last = path.size - 1;
-    while (first < path.size && !valid(point(first))) ++first;
-    while (last > first && !valid(point(last))) --last;
+    while (first < path.size && !is_finite(point(first))) ++first;
+    while (last > first && !is_finite(point(last))) --last;
     if (first >= last) return;
 
     const Vector axis{frame_.axis[0], frame_.axis[1], frame_.axis[2]};
@@ -245,7 +247,7 @@ void LineReader<T>::read_points(Line<T>& line, T* x, T* y) const {
     if (forward < 0) sideways = {-sideways.x, -sideways.y, -sideways.z};
     for (int k = first; k <= last; ++k) {
         const Vector p = point(k);
-        if (!valid(p)) continue;
+        if (!is_finite(p)) continue;
         const double r = dot(p, away);
         if (!frame_.projective) {
             x[k] = static_cast<T>(dot(p, sideways));
@@ -256,14 +258,41 @@ void LineReader<T>::read_points(Line<T>& line, T* x, T* y) const {
             y[k] = static_cast<T>(1 / z);
         }
     }
-    // In the plane of the image, of which the axis is the normal.
-    Vector right{1, 0, 0};
-    right = combination(right, -dot(axis, right), axis);
-    if (!normalise(right)) right = {0, 1, 0};
-    const Vector down = cross(axis, right);
+    const Vector right = across(axis), down = cross(axis, right);
     line.direction[0] = dot(sideways, right), line.direction[1] = dot(sideways, down);
     const double scale = frame_.projective ? 1 / dot(a, axis) : 1;
     line.offset = scale * (dot(a, down) * line.direction[0] - dot(a, right) * line.direction[1]);
+}
+
+// The rays of a line need not lie in a plane.
+template <class T>
+void LineReader<T>::read_curved(Line<T>& line, T* x, T* y) const {
+    const Vector axis{frame_.axis[0], frame_.axis[1], frame_.axis[2]};
+    const auto point = [&](int k) { return frame_.point(line.pixel(k)); };
+    RayFit rays(axis, frame_.ranges);
+    Vector sum{0, 0, 0};
+    int first = -1, last = -1;
+    for (int k = 0; k < line.path.size; ++k)
+        if (const Vector p = point(k); is_finite(p)) {
+            first = first < 0 ? k : first, last = k;
+            sum = combination(sum, 1, rays.ray(p));
+        }
+    if (first == last || !rays.orient(point(first), point(last), sum)) return;
+    for (int k = first; k <= last; ++k)
+        if (const Vector p = point(k); is_finite(p)) rays.add(p);
+    const Rays fitted = rays.fit();
+    for (int k = first; k <= last; ++k)
+        if (const Vector p = point(k); is_finite(p)) {
+            const double w = rays.place(p);
+            const Vector direction = fitted.at(w);
+            x[k] = static_cast<T>(w);
+            y[k] = static_cast<T>(frame_.ranges ? length(direction) / length(p) : dot(direction, axis) / dot(p, axis));
+        }
+    // In the plane of the image.
+    const Vector right = across(axis), down = cross(axis, right);
+    const auto turned = [&](const Vector& v) { return Vector{dot(v, right), dot(v, down), dot(v, axis)}; };
+    line.rays = {turned(fitted.c0), turned(fitted.c1), turned(fitted.c2)};
+    line.curved = true;
 }
 
 template class LineReader<float>;

@@ -24,6 +24,7 @@ private:
     void take_rows(Strip<T>& strip) const;
     void transpose(Strip<T>& strip) const;
     void read_points(Line<T>& line, T* x, T* y) const;
+    void read_curved(Line<T>& line, T* x, T* y) const;
     void set_tolerance(Line<T>& line, T* scale) const;
 
     const Frame<T>& frame_;

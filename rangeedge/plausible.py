@@ -1,0 +1,112 @@
+"""Whether a range image can be what the options say: units, geometry and thresholds that plainly do not fit it."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ._check import error
+from .options import ScanLineParams
+
+if TYPE_CHECKING:
+    from .frame import Frame
+
+_PACKAGE = str(Path(__file__).parent)
+_FORMATS = {  # of depth cameras
+    *((160, 120), (176, 144), (224, 172), (240, 180), (256, 192), (320, 240), (320, 288), (424, 240), (480, 270)),
+    *((480, 360), (512, 424), (512, 512), (640, 360), (640, 400), (640, 480), (640, 576), (848, 480), (960, 540)),
+    *((1024, 768), (1024, 1024), (1280, 720), (1280, 800), (1280, 960), (1280, 1024), (1920, 1080), (1944, 1200)),
+}
+_LEAST_ZEROS = 0.01  # share of the pixels, that zeros stand for no data
+_LEAST_IMAGE = 64 * 64  # pixels of what a camera may have taken
+_FAR_FROM_ZERO = 0.1  # of the median, above which all other depths lie then
+_MOST_DROPPED = 0.1  # share of the points
+_FEW_POINTS = 64  # that may be dropped without a word
+_FARTHEST = 1000.0  # metres, that integers are depths in millimetres or the like
+
+
+class RangeEdgeWarning(UserWarning):
+    """What plainly does not fit the range image: a unit, a threshold, a geometry that is missing."""
+
+
+def warn(text: str) -> None:
+    """Warn whoever called the package."""
+    level, frame = 1, sys._getframe()
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, RangeEdgeWarning, stacklevel=level)
+
+
+def question_geometry(src: np.ndarray, frame: Frame, params: ScanLineParams) -> None:
+    """Ask what the zeros of a plain image of floats are, and warn of a geometry that is missing or out of place."""
+    plain = src.ndim == 2 and params.K is None and params.pixelSize is None and not params.heightMap
+    if plain and params.invalid is None:
+        _refuse_zeros(src)
+    _warn_of_form(src, plain)
+    if src.dtype.kind in "iu" and params.K is not None:
+        _warn_of_factor(frame.ordinate[::8, ::8], params.depthFactor)
+
+
+def _refuse_zeros(src: np.ndarray) -> None:
+    """Ask what the zeros of a plain image of float depths are."""
+    if src.dtype.kind != "f" or src.size < _LEAST_IMAGE:
+        return
+    zeros = np.count_nonzero(src == 0)
+    if zeros < _LEAST_ZEROS * src.size or np.nanmin(src) < 0:
+        return
+    depths = src[src > 0]
+    if len(depths) and depths.min() > _FAR_FROM_ZERO * np.median(depths[np.isfinite(depths)]):
+        raise error(
+            f"`src` is 0 at {zeros} of {src.size} pixels: say invalid=0 if these have no data, invalid=() if 0 is a"
+            " value, or give the camera by K, which needs no depths of 0"
+        )
+
+
+def _warn_of_form(src: np.ndarray, plain: bool) -> None:
+    if src.dtype.kind in "iu" and src.dtype.itemsize == 1:
+        warn("`src` has 8 bits, too coarse for edges: pass the depths as the sensor gave them, in 16 bits or floats")
+    size = (src.shape[1], src.shape[0])
+    if plain and src.dtype == np.uint16 and (size in _FORMATS or size[::-1] in _FORMATS):
+        warn(
+            f"`src` looks like the image of a depth camera ({size[0]} x {size[1]}, 16 bits), but K is not given: angles"
+            " and noise are those of a grid with a spacing of 1; give K, or pixelSize where it is a grid"
+        )
+
+
+def _warn_of_factor(ordinates: np.ndarray, factor: float) -> None:
+    if np.nanmedian(np.append(ordinates, 1.0)) < 1 / _FARTHEST:
+        warn(
+            f"with depthFactor={factor:g} half of the scene lies beyond {_FARTHEST:g}: 1000 makes metres of millimetres"
+        )
+
+
+def warn_of_dropped(given: int, kept: int) -> None:
+    """Warn where points of an image lie behind its viewpoint."""
+    if given - kept > max(_MOST_DROPPED * given, _FEW_POINTS):
+        warn("more than a tenth of the points lie behind the viewpoint and are left out; say where it is by origin")
+
+
+def warn_of_thresholds(frame: Frame, **lengths: object) -> None:
+    """Warn of lengths beyond the whole range of depths, which nothing can exceed."""
+    given = {name: value for name, value in lengths.items() if isinstance(value, float) and value < np.inf}
+    for name, value in given.items():
+        # A part of the pixels is enough where it shows more.
+        if all(value > _extent(frame.ordinate[::step, ::step], frame.projective) > 0 for step in (8, 1)):
+            warn(
+                f"{name}={value:g} exceeds the range of depths in the whole image; its unit is that of the values,"
+                " metres for integers with depthFactor=1000"
+            )
+
+
+def _extent(ordinates: np.ndarray, projective: bool) -> float:
+    low, high = (
+        bound(ordinates, where=np.isfinite(ordinates), initial=start)
+        for bound, start in ((np.min, np.inf), (np.max, -np.inf))
+    )
+    if not low < high:
+        return 0.0
+    return float(1 / low - 1 / high if projective else high - low)

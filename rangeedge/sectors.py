@@ -1,0 +1,103 @@
+"""Edges of images that look all around: of overlapping sectors, in each of which rays have an axis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from .frame import Frame
+from .viewpoint import mean_ray, unit_rays
+
+_WIDEST = np.deg2rad(150)  # image that needs no sectors
+_SECTOR = np.deg2rad(90)
+_MARGIN = np.deg2rad(30)  # that a sector overlaps its neighbours, so that surfaces go on beyond its end
+_CLOSED = np.deg2rad(300)  # from which on first and last line may be neighbours
+_NEIGHBOURS = 2.5  # steps between lines, up to which they are
+
+
+class Sector(NamedTuple):
+    """A part of a frame: its lines `first` to `end` are those of the whole from `start` on."""
+
+    frame: Frame
+    axis: int
+    first: int
+    end: int
+    start: int
+
+    def own(self, values: np.ndarray) -> np.ndarray:
+        """What belongs to this sector alone, of values of its pixels."""
+        return values[:, self.first : self.end] if self.axis else values[self.first : self.end]
+
+    def put(self, whole: np.ndarray, values: np.ndarray) -> None:
+        """Write that into values of all pixels."""
+        stop = self.start + self.end - self.first
+        part = whole[:, self.start : stop] if self.axis else whole[self.start : stop]
+        part[...] = self.own(values)
+
+    def points(self, points: np.ndarray) -> np.ndarray:
+        """Edge points between its lines, in the pixels of the whole."""
+        name = "x" if self.axis else "y"
+        own = points[(points[name] >= self.first - 0.5) & (points[name] < self.end - 0.5)]
+        own[name] += self.start - self.first
+        return own
+
+
+def sectors_of(frame: Frame) -> list[Sector]:
+    """The sectors of an image whose rays are too far apart for one axis; none where they are not."""
+    if not frame.ranges:
+        return []
+    rays = unit_rays(frame.samples.astype(np.float64))
+    steps = [_steps(rays, axis) for axis in (0, 1)]
+    axis = int(steps[1].sum() > steps[0].sum())
+    along = steps[axis]
+    extent = float(along.sum())
+    if extent <= _WIDEST:
+        return []
+    return list(_divided(frame, axis, extent, is_closed(rays, axis, along)))
+
+
+def _steps(rays: np.ndarray, axis: int) -> np.ndarray:
+    """Angles between the middles of neighbouring lines across an axis; the typical one where a line has no data."""
+    middles = _middles(rays, axis)
+    angles = _angles(middles[:-1], middles[1:])
+    known = angles[np.isfinite(angles)]
+    return np.where(np.isfinite(angles), angles, np.median(known) if len(known) else 0.0)
+
+
+def _middles(rays: np.ndarray, axis: int) -> np.ndarray:
+    seen = np.isfinite(rays[..., 0])
+    sums = np.where(seen[..., None], rays, 0).sum(axis=1 - axis)
+    counts = seen.sum(axis=1 - axis)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        sums[counts == 0] = np.nan
+        return sums / np.linalg.norm(sums, axis=1, keepdims=True)
+
+
+def _angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
+
+
+def is_closed(rays: np.ndarray, axis: int, steps: np.ndarray) -> bool:
+    """Whether first and last line are neighbours."""
+    middles = _middles(rays, axis)
+    seen = middles[np.isfinite(middles[:, 0])]
+    return bool(steps.sum() > _CLOSED and _angles(seen[-1:], seen[:1])[0] <= _NEIGHBOURS * np.median(steps))
+
+
+def _divided(frame: Frame, axis: int, extent: float, closed: bool) -> Iterator[Sector]:
+    count = frame.shape[axis]
+    parts = int(np.ceil(extent / _SECTOR))
+    margin = int(np.ceil(count * _MARGIN / extent))
+    bounds = np.linspace(0, count, parts + 1).astype(int)
+    for start, stop in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
+        lines = np.arange(start - margin, stop + margin)
+        lines = lines % count if closed else lines[(lines >= 0) & (lines < count)]
+        samples = np.take(frame.samples, lines, axis)
+        noise = np.take(frame.noise, lines, axis) if isinstance(frame.noise, np.ndarray) else frame.noise
+        seen = samples[np.isfinite(samples[..., 0])].astype(np.float64)
+        part = replace(frame, samples=samples, noise=noise, axis=mean_ray(seen) if len(seen) else frame.axis)
+        first = margin if closed else start - int(lines[0])
+        yield Sector(part, axis, first, first + stop - start, start)
