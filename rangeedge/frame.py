@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import cv2
@@ -29,13 +29,13 @@ def threads_worth(pixels: int) -> int:
 class Frame:
     """A range image as the kernels take it: invalid pixels are NaN, ordinates grow toward the viewer.
 
-    `samples` holds inverse depth (`projective`) or height of shape (H, W), or points of shape (H, W, 3).
-    `to_plane` takes (column, row, 1) to normalised image coordinates or to lengths; `axis` is the viewing direction;
-    `heightMap` says that heights grow toward the viewer in the image, too; `spaced` that the spacing of pixels is known
-    in the unit of the values, which on a grid 1 does not say. `step` is the length to whose multiples the values were rounded, 0 if none is known.
-    `curved` says that the rays of a scan line need not lie in a plane, `ranges` that depths are measured along the rays
-    and not along `axis`; `origin` is the viewpoint in the frame in which points came, and zero in that of `samples`.
-    `noise` is a model or a map of deviations.
+    `samples` holds inverse depth (`projective`) or height of shape (H, W), or points of shape (H, W, 3). `to_plane`
+    takes (column, row, 1) to normalised image coordinates or to lengths; `axis` is the viewing direction; `heightMap`
+    says that heights grow toward the viewer in the image, too; `spaced` that the spacing of pixels is known in the unit
+    of the values, which on a grid 1 does not say. `step` is the length to whose multiples the values were rounded, 0 if
+    none is known. `curved` says that the rays of a scan line need not lie in a plane, `ranges` that depths are measured
+    along the rays and not along `axis`; `origin` is the viewpoint in the frame in which points came, and zero in that
+    of `samples`. `noise` is a model or a map of deviations.
     """
 
     samples: np.ndarray
