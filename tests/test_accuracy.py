@@ -71,13 +71,14 @@ def seen(request):
 
 
 def test_every_edge_is_found_within_a_pixel(seen):
-    _, rendering, _ = seen
-    strength = strength_of(rendering, maxSmear=0)  # else faces that are a few pixels wide may be taken for smear
+    _, rendering, strength = seen
     truth = rendering.edges(JUMP, CREASE)
     edges = (truth > 0) & (truth < 4)
     assert edges.sum() > 1000
     # A neighbouring pixel, diagonal ones included.
-    assert within(edge_pixels(strength), 1.5)[edges].mean() > 0.999
+    assert within(edge_pixels(strength_of(rendering, maxSmear=0)), 1.5)[edges].mean() > 0.999
+    # A steep face of up to five pixels may be taken for smear, whose edge is in its middle.
+    assert within(edge_pixels(strength), 3.5)[edges].mean() > 0.995
 
 
 def test_polyhedra_have_no_other_edges(seen):

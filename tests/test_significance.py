@@ -7,6 +7,8 @@ from scenes import K, seen, surfaces
 from rangeedge import (
     CREASE_MAX,
     DIR_ROWS,
+    EDGE_JUMP,
+    EDGE_OCCLUDING,
     EdgeStrength,
     NoiseModel,
     detectEdges,
@@ -55,30 +57,26 @@ def test_significance_is_in_deviations_of_what_neighbours_tell_together(edge):
     np.testing.assert_allclose(of(**{other: 2.5}), of(), rtol=1e-5)
 
 
-def test_what_pixels_of_a_line_tell_adds_up_along_it():
-    """A line of 40 pixels needs half the significance of one of 10, whose pixels need that of the line."""
-    crease, significance = np.zeros((2, 9, 60), np.float32)
-    crease[2:4, 3:43] = crease[6:8, 3:43] = crease[2:4, 45:55] = crease[6:8, 45:55] = 60
-    significance[2:4, 3:43], significance[6:8, 3:43] = 7.1, 6.9
-    significance[2:4, 45:55], significance[6:8, 45:55] = 14.1, 13.9
-    strength = EdgeStrength(np.zeros_like(crease), crease, np.zeros(crease.shape, np.uint8), significance)
-    edges = selectEdges(strength, lineSignificance=14) > 0
-    assert np.array_equal(edges[:5], crease[:5] > 0)
-    assert not edges[5:].any()
-    assert np.array_equal(selectEdges(strength, lineSignificance=0) > 0, crease > 0)
-    significance[2:4, 45:55:2], significance[2:4, 46:55:2] = 0, 14.1 * np.sqrt(2)  # the root mean square counts
-    assert (selectEdges(strength, lineSignificance=14)[2:4, 45:55] > 0).all()
+def test_a_line_is_as_significant_as_its_pixels_and_the_more_so_the_longer_it_is():
+    jump, significance = np.zeros((2, 9, 60), np.float32)
+    jump[2, 3:13] = jump[6, 3:43] = 1
+    significance[2, 3:13:2], significance[2, 4:14:2] = 7, 1  # root mean square 5
+    significance[6, 3:43] = 3  # over four times as many pixels
+    kind = np.where(jump > 0, EDGE_JUMP | EDGE_OCCLUDING, 0).astype(np.uint8)
+    strength = EdgeStrength(jump, np.zeros_like(jump), kind, significance)
+    for least, short, long in ((0, True, True), (4.99, True, True), (5.01, False, True), (6.01, False, False)):
+        expected = jump > 0
+        expected[2] &= short
+        expected[6] &= long
+        assert np.array_equal(selectEdges(strength, 1.0, lineSignificance=least) > 0, expected)
 
 
 def test_the_detector_leaves_lines_out_that_are_not_significant():
     z = 1 + 0.002 * np.abs(U - 29.6) * np.ones((50, 1)) + np.random.default_rng(2).normal(0, 0.004, (50, 60))
-    strength = edgeStrength(z, noise=0.004, pixelSize=0.002)
-    for least in (0, 5, 10, 14, 20, 30, 1000):
-        options = {"lineSignificance": least}
-        found = selectEdges(strength, **options).any()
-        assert found or least > 14
-        assert not found or least < 1000
-        assert detectEdges(z, noise=0.004, pixelSize=0.002, **options).any() == found
+    options = dict(noise=0.004, pixelSize=0.002)
+    assert detectEdges(z, **options).any()
+    assert detectEdges(z, lineSignificance=14.0, **options).any()
+    assert not detectEdges(z, lineSignificance=200.0, **options).any()
 
 
 # Splitting.

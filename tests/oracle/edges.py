@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -120,6 +120,10 @@ class Detector:
             candidate = self._measured(line, left, right, a, b, middle, (a + b) / 2, False)
         if not candidate or not candidate.kind & EDGE_JUMP:
             return None
+        # It lies where the ramp passes its middle.
+        low = max([left.last] + [k for k, p in zip(samples, share, strict=True) if p < 0.5])
+        high = min(k for k in [*samples, right.first] if k > low)
+        candidate = replace(candidate, **_at(line, low, high, (low + high) / 2), shift=0.0, smeared=True)
         self.smeared.update(line.pixels[k] for k in smeared)
         return candidate, long[1]
 
@@ -141,10 +145,8 @@ class Detector:
         if not _is_jump(line, a, b, difference, noise.of_jump("value")):
             return None
         first = near is left.curve
-        sample, (u, v), (dx, dy) = a + 0.5 if first else b - 0.5, line.pixels[0], STEPS[line.direction]
         return Candidate(
-            x=u + sample * dx,
-            y=v + sample * dy,
+            **_at(line, a, b, a + 0.5 if first else b - 0.5),
             shift=0.0,
             jump=min(
                 _range_around(line, a, b), *(abs(line.height(y) - line.height(other)) for other in (below, y_far))
@@ -153,7 +155,6 @@ class Detector:
             significance=difference / noise.of_jump("shared_value"),
             kind=EDGE_JUMP | (EDGE_OCCLUDING if first else EDGE_OCCLUDED),
             direction=line.direction,
-            pixels=(line.pixels[a], line.pixels[b]),
             place=np.zeros(2),
             along=np.zeros(2),
             sides=[(0.0, 0.0, math.inf)] * 2,
@@ -220,20 +221,17 @@ class Detector:
             kind |= EDGE_CONVEX if bend > 0 else EDGE_CONCAVE
         jump_significance = difference / noise.of_jump("shared_value") if jump > 0 else 0.0
         crease_significance = abs(bend) / noise.of_crease("shared_slope") if crease > 0 else 0.0
-        (u, v), (dx, dy) = line.pixels[0], STEPS[line.direction]
         place, along = (np.array(p) for p in line.place(x))
         sides = [(yf, mf, f.slope("slope") ** 2), (yg, mg, g.slope("slope") ** 2)]
         unit = float(np.hypot(*along))
         return Candidate(
-            x=u + sample * dx,
-            y=v + sample * dy,
+            **_at(line, before, after, sample),
             shift=sample - (left.last + right.first) / 2,
             jump=jump,
             crease=crease,
             significance=max(jump_significance, crease_significance),
             kind=kind,
             direction=line.direction,
-            pixels=(line.pixels[before], line.pixels[after]),
             place=place,
             along=along / unit,
             sides=[(value, slope / unit, variance / unit**2) for value, slope, variance in sides],
@@ -243,6 +241,12 @@ class Detector:
 def _extended(curve, x, to):
     """To where a curve leads from an abscissa to another one, by itself and straight on."""
     return curve.value(to), curve.value(x) + curve.slope(x) * (to - x)
+
+
+def _at(line, before, after, sample):
+    """Where a candidate is: its position, and the pixels on either side."""
+    (u, v), (dx, dy) = line.pixels[0], STEPS[line.direction]
+    return dict(x=u + sample * dx, y=v + sample * dy, pixels=(line.pixels[before], line.pixels[after]))
 
 
 def _range_around(line, before, after):
@@ -274,9 +278,9 @@ def _largest_third_difference(line, before, after, margin):
 
 
 def _in_smear(c, smeared):
-    """A jump whose nearer side is smeared, or a crease of which a pixel is smeared or beside one that is."""
+    """A jump whose nearer side is smeared, unless it is that of a smeared step, or a crease within or beside smear."""
     if c.kind & EDGE_JUMP:
-        return c.pixels[0 if c.kind & EDGE_OCCLUDING else 1] in smeared
+        return not c.smeared and c.pixels[0 if c.kind & EDGE_OCCLUDING else 1] in smeared
     return not _around(c.pixels).isdisjoint(smeared)
 
 

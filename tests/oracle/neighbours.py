@@ -41,6 +41,7 @@ class Candidate:
     place: np.ndarray
     along: np.ndarray
     sides: list
+    smeared: bool = False  # a step over several samples, in whose middle it lies
 
 
 @dataclass

@@ -41,8 +41,8 @@ public:
     // a smeared step goes on from line to line.
     SmearMask(int rows, int cols, const std::vector<std::int32_t>& found, int least);
 
-    // Removes jumps whose nearer side is smeared, unless they are those of smeared steps, and creases of which a pixel is
-    // smeared or beside one that is.
+    // Removes jumps whose nearer side is smeared, unless they are those of smeared steps, and creases of which a pixel
+    // is smeared or beside one that is.
     void clear_of_candidates(std::vector<Candidate>& candidates) const;
     // 255 where a pixel is smeared; the output holds zeros before.
     void write(std::uint8_t* smeared) const;

@@ -93,8 +93,8 @@ double largest_jump(const Line<T>& line, int before, int after) {
     return farthest - nearest;
 }
 
-// The largest third difference of the samples from `before` to `after` and `margin` on either side; infinite where one of
-// them has no data, or they are too few.
+// The largest third difference of the samples from `before` to `after` and `margin` on either side; infinite where one
+// of them has no data, or they are too few.
 template <class T>
 double largest_third_difference(const Line<T>& line, int before, int after, int margin) {
     const int first = std::max(before - margin, 0), last = std::min(after + margin, line.path.size - 1);
