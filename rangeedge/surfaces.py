@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
 from . import _core
+from ._check import error
 from .frame import Frame
+from .sectors import sectors_of
 
 SURFACE = np.dtype([("curved", np.bool_), ("centroid", "3f8"), ("normal", "3f8"), ("quadric", "10f8"), ("rms", "f8")])
 _CURVED_GAIN = 0.8  # a quadratic must lower the rms of a plane to this share
@@ -15,10 +20,23 @@ _QUADRIC_POINTS = 40  # fewer tell no curvature
 def surface_map(frame: Frame, edges: np.ndarray | None) -> _core.RangeMap:
     """What the kernels on surfaces take: places on the image plane, ordinates and their noise, edges."""
     x, y, to_plane = _places(frame)
-    seen = frame.ordinate[frame.valid.view(bool)]
+    ordinate = _along_axis(frame)
+    seen = ordinate[np.isfinite(ordinate)]
     offset = float(seen[:: max(1, len(seen) // 4096)].mean(dtype=np.float64)) if len(seen) else 0.0
-    ordinate = (frame.ordinate - frame.ordinate.dtype.type(offset)).astype(np.float32, copy=False)
+    ordinate = (ordinate - ordinate.dtype.type(offset)).astype(np.float32, copy=False)
     return _core.RangeMap(frame.kernel, x, y, ordinate, offset, to_plane, edges)
+
+
+def _along_axis(frame: Frame) -> np.ndarray:
+    """Ordinates of which planes are affine functions of the image plane."""
+    if not frame.ranges:
+        return frame.ordinate
+    if sectors_of(frame):
+        raise error(
+            "`src` must hold points of a sector below 150 degrees, whose surfaces can be seen on one image plane; take the"
+            " columns of one sector after the other"
+        )
+    return replace(frame, ranges=False).ordinate
 
 
 def _places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[float, ...]]:
@@ -47,12 +65,12 @@ def surfaces_of(frame: Frame, labels: np.ndarray, count: int) -> np.ndarray:
     """The plane, or the quadric where a plane fails, of every label 1 .. count - 1."""
     surfaces = np.zeros(count, SURFACE)
     points = frame.points.reshape(-1, 3)
-    toward = frame.toward_viewer
+    toward, ordinates = frame.toward_viewer, _along_axis(frame).ravel()
     order = np.argsort(labels, axis=None, kind="stable")
     starts = np.searchsorted(labels.ravel()[order], np.arange(count + 1))
     for label in range(1, count):
         inside = order[starts[label] : starts[label + 1]]
-        _describe(surfaces[label], points[inside], frame.ordinate.ravel()[inside], inside, labels.shape[1], toward)
+        _describe(surfaces[label], points[inside], ordinates[inside], inside, labels.shape[1], toward)
     return surfaces
 
 
@@ -62,7 +80,7 @@ def _describe(
     ordinate: np.ndarray,
     pixels: np.ndarray,
     width: int,
-    toward: np.ndarray | None,
+    toward: Callable[[np.ndarray], np.ndarray],
 ) -> None:
     centroid = points.mean(axis=0)
     values, vectors = np.linalg.eigh(np.cov((points - centroid).T, bias=True) if len(points) > 1 else np.eye(3))
@@ -73,7 +91,7 @@ def _describe(
         quadric, rms = _taubin(points, centroid)
         normal = _gradient(quadric, centroid[None])[0]
         normal /= np.linalg.norm(normal) or 1.0
-    if normal @ (-centroid if toward is None else toward) < 0:
+    if normal @ toward(centroid) < 0:
         normal, quadric = -normal, -quadric
     surface["curved"], surface["centroid"], surface["normal"] = curved, centroid, normal
     surface["quadric"], surface["rms"] = quadric, rms
