@@ -50,6 +50,7 @@ from .plausible import RangeEdgeWarning
 from .regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
 from .seeds import extractSeeds, extractSeedsWithStats
 from .selection import overallStrength, selectEdges, strengthImage
+from .sweep import sweepToPoints
 from .thinning import thinEdges
 
 if TYPE_CHECKING:
@@ -67,6 +68,7 @@ __all__ = [  # noqa: RUF022
     "RangeImage",
     "imreadRange",
     "imwriteRange",
+    "sweepToPoints",
     "NoiseModel",
     "estimateNoise",
     "ScanLineParams",

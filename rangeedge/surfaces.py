@@ -33,8 +33,8 @@ def _along_axis(frame: Frame) -> np.ndarray:
         return frame.ordinate
     if sectors_of(frame):
         raise error(
-            "`src` must hold points of a sector below 150 degrees, whose surfaces can be seen on one image plane; take the"
-            " columns of one sector after the other"
+            "`src` must hold points of a sector below 150 degrees, whose surfaces can be seen on one image plane;"
+            " take the columns of one sector after the other"
         )
     return replace(frame, ranges=False).ordinate
 

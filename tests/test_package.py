@@ -20,7 +20,8 @@ import rangeedge
 from rangeedge import _core
 
 PUBLIC = """
-    error RangeEdgeWarning RangeImage imreadRange imwriteRange NoiseModel estimateNoise ScanLineParams splitScanLine
+    error RangeEdgeWarning RangeImage imreadRange imwriteRange sweepToPoints NoiseModel estimateNoise
+    ScanLineParams splitScanLine
     EdgeStrength edgeStrength edgePoints kindNames flyingPixels strengthImage overallStrength selectEdges thinEdges
     detectEdges detectEdgesWithStrength
     ScanLineDetector createScanLineDetector closeContours

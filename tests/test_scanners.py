@@ -98,6 +98,22 @@ def test_a_plane_has_no_edges_whatever_cone_it_is_seen_along():
     assert not detectEdges(points).any()
 
 
+def test_range_images_are_the_points_of_their_angles():
+    rays, ranges, _ = sweep(32, 15, (180, -180))
+    points = rangeedge.sweepToPoints(ranges, np.linspace(15, -15, 32))
+    np.testing.assert_allclose(points, rays * ranges[..., None], atol=1e-12)
+    up, around = np.broadcast_arrays(np.linspace(15, -15, 32)[:, None], np.linspace(180, -180, COLUMNS, endpoint=False))
+    millimetres = np.rint(1000 * ranges).astype(np.uint16)
+    millimetres[3, 4] = 0
+    whole = rangeedge.sweepToPoints(millimetres, up, around)
+    assert np.isnan(whole[3, 4]).all()
+    assert np.isfinite(whole).all(axis=2).sum() == ranges.size - 1
+    np.testing.assert_allclose(np.linalg.norm(whole, axis=2)[5], ranges[5], atol=6e-4)
+    for name, options in (("elevation", {"elevation": [1, 2]}), ("azimuth", {"elevation": up, "azimuth": [np.nan]})):
+        with pytest.raises(rangeedge.error, match=f"sweepToPoints: `{name}` must be"):
+            rangeedge.sweepToPoints(ranges, **options)
+
+
 # Other frames than the sensor's.
 
 

@@ -39,7 +39,8 @@ def sentence(known: dict[str, Any]) -> str:
     jump = known["jumpThreshold"]
     return (
         f"{known['geometry']}, unit: {known['unit']}; depths {low:.4g} to {high:.4g},"
-        f" pixels {known['pixelSpacing']:.3g} apart, noise {known['noiseAtMedian']:.2g} at the median {known['medianDepth']:.4g}; jumps"
+        f" pixels {known['pixelSpacing']:.3g} apart,"
+        f" noise {known['noiseAtMedian']:.2g} at the median {known['medianDepth']:.4g}; jumps"
         f" {jump if isinstance(jump, str) else f'from {jump:g}'}, creases from {known['creaseThreshold']:g} degrees"
     )
 
