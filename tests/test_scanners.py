@@ -98,6 +98,15 @@ def test_a_plane_has_no_edges_whatever_cone_it_is_seen_along():
     assert not detectEdges(points).any()
 
 
+def test_pixels_that_fly_are_found_all_around():
+    rays, ranges, _ = sweep(64, 15, (180, -180))
+    ranges = np.full_like(ranges, 4.0)
+    ranges[:, 100:200], ranges[:, 99], ranges[:, 200] = 3.0, 3.5, 3.5
+    flying = rangeedge.flyingPixels(rays * ranges[..., None], noise=0.002) > 0
+    assert flying[5:-5, [99, 200]].mean() > 0.9
+    assert not np.delete(flying, [99, 200], axis=1).any()
+
+
 def test_range_images_are_the_points_of_their_angles():
     rays, ranges, _ = sweep(32, 15, (180, -180))
     points = rangeedge.sweepToPoints(ranges, np.linspace(15, -15, 32))
