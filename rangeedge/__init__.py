@@ -55,6 +55,7 @@ from .regions import growRegions, growRegionsWithStats, segmentRegions, segmentR
 from .seeds import extractSeeds, extractSeedsWithStats
 from .segments import Segments, fitSegments
 from .selection import overallStrength, selectEdges, strengthImage
+from .sweep import sweepToPoints
 from .thinning import thinEdges
 
 if TYPE_CHECKING:
@@ -72,6 +73,7 @@ __all__ = [  # noqa: RUF022
     "RangeImage",
     "imreadRange",
     "imwriteRange",
+    "sweepToPoints",
     "backproject",
     "project",
     "NoiseModel",

@@ -172,7 +172,10 @@ def edgeStrength(
     Parameters
     ----------
     src : ndarray
-        (H, W) depth, or points (H, W, 3) or (H, W, 4) in the camera frame (x right, y down, z away).
+        (H, W) depth, or points (H, W, 3) or (H, W, 4), of a camera (x right, y down, z away) or of any scanner in any
+        axes: where their rays meet in the origin or in `origin`, lines of sight start there, and where their rows lie
+        on cones (a scanner that turns) depths are distances from there. Points that tell no viewpoint are refused.
+        Masked arrays, records with fields x, y and z, `cv2.UMat` and what has ``__array__`` or DLPack are taken too.
         Integers are divided by `depthFactor` and invalid where <= 0. With `K`, depths that are not positive and
         finite are invalid; without it, only non-finite values are. Heights (`heightMap`) may be negative: of signed
         integers only the least of the type is invalid.

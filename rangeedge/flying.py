@@ -10,8 +10,10 @@ from . import _core
 from ._check import deliver
 from ._option import parsed, takes
 from .edges import kernel_options
+from .frame import Frame
 from .noise import measured_frame
 from .options import SCAN_LINES, ScanLineParams
+from .sectors import sectors_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -82,6 +84,14 @@ def flyingPixels(
     """
     (params,) = parsed({"eps": eps, **options}, ScanLineParams)
     frame = measured_frame(src, params, mask)
+    return deliver("dst", _flying(frame, params), dst)
+
+
+def _flying(frame: Frame, params: ScanLineParams) -> np.ndarray:
     flying = np.zeros(frame.shape, np.uint8)
-    _core.flying_pixels(frame.kernel, kernel_options(frame, params), frame.threads, flying)
-    return deliver("dst", flying, dst)
+    parts = sectors_of(frame)
+    for part in parts:
+        part.put(flying, _flying(part.frame, params))
+    if not parts:
+        _core.flying_pixels(frame.kernel, kernel_options(frame, params), frame.threads, flying)
+    return flying

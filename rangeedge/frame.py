@@ -96,11 +96,10 @@ class Frame:
             z = 1 / self.ordinate.astype(np.float64)
         return np.stack([x * z, y * z, z], axis=-1)
 
-    @property
-    def toward_viewer(self) -> np.ndarray | None:
-        """The direction toward the viewer; None where it is that of the origin."""
+    def toward_viewer(self, point: np.ndarray) -> np.ndarray:
+        """The direction toward the viewer from one of `points`."""
         if self.projective:
-            return None
+            return np.asarray(self.origin) - point
         if self.samples.ndim == 3:
             return -np.asarray(self.axis)
         return np.array([0.0, 0.0, 1.0 if self.heightMap else -1.0])

@@ -29,6 +29,7 @@ from .results import (
     region_files,
     write_folder,
 )
+from .understood import sentence
 
 _INPUT = """A range image: 16-bit or float PNG, TIFF, PGM, EXR, PFM, NPY, NPZ, organized PCD or PLY,
 or a file of an ABW, Perceptron or Technical Arts scanner. With a pinhole camera give -K; without, the image is
@@ -322,6 +323,7 @@ def _say_found(title: str, found: EdgeResults) -> None:
     height, width = found.frame.shape
     valid = 100 * np.count_nonzero(found.frame.valid) / (height * width)
     print(f"{title}: {width} x {height} pixels, {valid:.0f} % with data, {np.count_nonzero(found.thin)} edge pixels")
+    print(f"  {sentence(found.known)}")
 
 
 def _say_written(out: Path, files: dict[str, str]) -> None:

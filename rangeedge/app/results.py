@@ -26,9 +26,11 @@ from ..edges import EdgeStrength, measure_both
 from ..frame import Frame
 from ..noise import measured_frame
 from ..options import DETECTION, Growing, ScanLineParams, Selection
+from ..plausible import warn_of_thresholds
 from ..regions import described_regions, seeded_regions
 from ..selection import select_strength
 from ..thinning import thinEdges
+from .understood import understood
 
 _REPORT = "report.json"
 _LABELS = 65535  # that 16 bits hold
@@ -65,6 +67,7 @@ class EdgeResults(NamedTuple):
     edges: np.ndarray
     thin: np.ndarray
     distance: np.ndarray
+    known: dict[str, Any]
 
     @property
     def surface(self) -> np.ndarray:
@@ -78,14 +81,17 @@ class EdgeResults(NamedTuple):
 def find_edges(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> EdgeResults:
     """What `detectEdges` returns, with all that it computes on the way."""
     params, selection = parsed(options, ScanLineParams, Selection)
-    return _edges_of(measured_frame(src, params, mask), params, selection)
+    return _edges_of(src, mask, params, selection)
 
 
-def _edges_of(frame: Frame, params: ScanLineParams, selection: Selection) -> EdgeResults:
+def _edges_of(src: np.ndarray, mask: np.ndarray | None, params: ScanLineParams, selection: Selection) -> EdgeResults:
+    frame = measured_frame(src, params, mask)
+    warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
     strength, points = measure_both(frame, params)
     edges = select_strength(strength, selection)
     thin = thinEdges(edges)
-    return EdgeResults(frame, strength, points, edges, thin, distanceTransform(thin))
+    known = understood(frame, params, selection, src)
+    return EdgeResults(frame, strength, points, edges, thin, distanceTransform(thin), known)
 
 
 class RegionResults(NamedTuple):
@@ -103,7 +109,7 @@ class RegionResults(NamedTuple):
 def find_regions(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> RegionResults:
     """What `segmentRegionsWithStats` returns, with all that it computes on the way."""
     params, selection, growing = parsed(options, ScanLineParams, Selection, Growing)
-    found = _edges_of(measured_frame(src, params, mask), params, selection)
+    found = _edges_of(src, mask, params, selection)
     seeds, labels = seeded_regions(found.frame, found.thin, growing)
     _, _, stats, _, surfaces = described_regions(found.frame, labels)
     return RegionResults(found, seeds, labels, stats, surfaces)
@@ -165,6 +171,7 @@ def _report(found: EdgeResults, title: str, options: Mapping[str, Any], **more: 
         "validPixels": int(np.count_nonzero(found.frame.valid)),
         "edgePixels": int(np.count_nonzero(found.thin)),
         **more,
+        "understood": plain(found.known),
         "noise": plain(found.frame.noise),
     }
     return json.dumps(report, indent=2, allow_nan=False).encode() + b"\n"

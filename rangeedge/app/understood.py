@@ -1,0 +1,72 @@
+"""What the command line has understood of an image: unit, depths, spacing, noise, and the thresholds in effect."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..frame import Frame
+from ..options import ScanLineParams, Selection
+
+
+def understood(frame: Frame, params: ScanLineParams, selection: Selection, src: np.ndarray) -> dict[str, Any]:
+    """In numbers, lengths in the unit of the image."""
+    depths = frame.depth[frame.valid.view(bool)].astype(np.float64)
+    if frame.heightMap:
+        depths = -depths
+    middle = float(np.median(depths)) if len(depths) else None
+    factor = params.depthFactor
+    integers = np.asarray(src).dtype.kind in "iu"
+    return {
+        "geometry": _geometry(frame, params),
+        "unit": f"stored values / {factor:g}" if integers else "that of the stored values",
+        "depthRange": [float(depths.min()), float(depths.max())] if len(depths) else None,
+        "medianDepth": middle,
+        "pixelSpacing": _spacing(frame),
+        "noiseAtMedian": _noise(frame, middle),
+        "jumpThreshold": selection.jumpThreshold or "beyond the noise",
+        "creaseThreshold": selection.creaseThreshold,
+        "eps": params.eps or f"{params.epsFactor:g} times the noise",
+    }
+
+
+def sentence(known: dict[str, Any]) -> str:
+    """The same in words."""
+    if known["depthRange"] is None:
+        return f"{known['geometry']}, no data"
+    low, high = known["depthRange"]
+    jump = known["jumpThreshold"]
+    return (
+        f"{known['geometry']}, unit: {known['unit']}; depths {low:.4g} to {high:.4g},"
+        f" pixels {known['pixelSpacing']:.3g} apart,"
+        f" noise {known['noiseAtMedian']:.2g} at the median {known['medianDepth']:.4g}; jumps"
+        f" {jump if isinstance(jump, str) else f'from {jump:g}'}, creases from {known['creaseThreshold']:g} degrees"
+    )
+
+
+def _geometry(frame: Frame, params: ScanLineParams) -> str:
+    if params.K is not None:
+        return "pinhole camera"
+    if frame.samples.ndim == 2:
+        kind = "heights on a grid" if frame.heightMap else "depths on a grid"
+        return kind if frame.spaced else f"{kind} of unknown spacing, taken as 1"
+    if frame.ranges:
+        return "points of a scanner that turns"
+    return "points seen from one place" if frame.projective else "points seen in parallel"
+
+
+def _spacing(frame: Frame) -> float:
+    """Median distance between neighbours in space, across the view where depths differ."""
+    if frame.samples.ndim == 2 and not frame.projective:
+        return frame.to_plane[0]
+    points = frame.points
+    steps = np.linalg.norm(np.diff(points[::8], axis=1), axis=2)
+    steps = steps[np.isfinite(steps)]
+    return float(np.median(steps)) if len(steps) else 0.0
+
+
+def _noise(frame: Frame, depth: float | None) -> float | None:
+    if isinstance(frame.noise, np.ndarray):
+        return float(np.median(frame.noise[frame.valid.view(bool)])) if frame.valid.any() else None
+    return None if depth is None else float(frame.noise(abs(depth)))

@@ -1,0 +1,221 @@
+"""Scanners that turn, lenses with distortion, clouds in other frames: the same scene gives the same edges."""
+
+import cv2
+import numpy as np
+import pytest
+
+import rangeedge
+from rangeedge import detectEdges, edgePoints, edgeStrength, segmentRegions
+from rangeedge.frame import read_frame
+from rangeedge.options import ScanLineParams
+
+WALLS = ((0, 5.0), (0, -4.0), (1, 3.5), (1, -4.5), (2, -1.2), (2, 1.8))  # axis, place
+COLUMNS = 512
+
+
+def sweep(rows, elevation, azimuth, tilt=0.0):
+    """Unit rays, ranges and faces of a room around a scanner that turns."""
+    up = np.radians(np.linspace(elevation, -elevation, rows))[:, None]
+    around = np.radians(np.linspace(*azimuth, COLUMNS, endpoint=azimuth[0] - azimuth[1] < 359))[None]
+    rays = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up) + 0 * around], -1)
+    c, s = np.cos(np.radians(tilt)), np.sin(np.radians(tilt))
+    seen = rays @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]).T
+    ranges, faces = np.full(rays.shape[:2], np.inf), np.zeros(rays.shape[:2], int)
+    for face, (axis, place) in enumerate(WALLS):
+        with np.errstate(divide="ignore"):
+            there = place / seen[..., axis]
+        nearer = (there > 0) & (there < ranges)
+        ranges[nearer], faces[nearer] = there[nearer], face
+    return rays, ranges, faces
+
+
+def borders(faces):
+    """Pixels beside another face, first and last column being neighbours."""
+    found = (faces != np.roll(faces, 1, 1)) | (faces != np.roll(faces, -1, 1))
+    found[1:] |= faces[1:] != faces[:-1]
+    found[:-1] |= faces[1:] != faces[:-1]
+    return found
+
+
+def near(pixels, others, reach=2):
+    """Share of pixels within `reach` of others, around the seam as well."""
+    far = cv2.distanceTransform((~np.tile(others, 3)).astype(np.uint8), cv2.DIST_L2, 5)
+    return (far[:, pixels.shape[1] : 2 * pixels.shape[1]][pixels] <= reach).mean()
+
+
+def camera_axes(points):
+    return np.stack([-points[..., 1], -points[..., 2], points[..., 0]], -1)
+
+
+@pytest.mark.parametrize("tilt", [0, 10])
+@pytest.mark.parametrize("noise", [0, 0.005])
+@pytest.mark.parametrize("rows", [32, 64, 128])
+def test_a_room_all_around(rows, noise, tilt):
+    rays, ranges, faces = sweep(rows, 22.5, (180, -180), tilt)
+    points = rays * (ranges + noise * np.random.default_rng(0).standard_normal(ranges.shape))[..., None]
+    assert read_frame(points, ScanLineParams()).valid.all()
+    truth = borders(faces)
+    for cloud in (points, camera_axes(points).astype(np.float32)):
+        edges = detectEdges(cloud) > 0
+        assert near(edges, truth) >= 0.95
+        assert near(truth, edges) >= 0.95
+
+
+def test_walls_meet_at_right_angles_and_the_seam_is_no_border():
+    rays, ranges, faces = sweep(128, 10, (180, -180))
+    turn = COLUMNS // 2 - int(np.argmax(faces[64] != np.roll(faces[64], 1)))
+    noise = 0.003 * np.random.default_rng(1).standard_normal(ranges.shape)
+    points = np.roll(rays * (ranges + noise)[..., None], turn + COLUMNS // 2, axis=1)  # a corner between last and first
+    turned = np.roll(faces, turn + COLUMNS // 2, axis=1)
+    assert (turned[:, 0] != turned[:, -1]).mean() > 0.5
+    crease = edgeStrength(points).crease
+    wall = (turned < 4) & (np.roll(turned, 1, 1) < 4)
+    beside = wall & (turned != np.roll(turned, 1, 1))
+    for edge in (beside[:, :1], beside[:, 1:]):
+        columns = crease[:, :1] if edge.shape[1] == 1 else crease[:, 1:]
+        assert edge.sum() > 50
+        assert np.median(columns[edge]) == pytest.approx(90, abs=0.5)
+
+
+def test_points_and_strengths_of_sectors_agree():
+    rays, ranges, _ = sweep(32, 15, (180, -180))
+    cloud = rays * ranges[..., None]
+    found, points = edgeStrength(cloud, noise=0.001), edgePoints(cloud, noise=0.001)
+    assert points["x"].min() >= -0.5
+    assert points["x"].max() < COLUMNS - 0.5
+    assert set(np.unique(np.rint(points["x"]) // 128)) >= {0, 1, 2, 3}
+    assert ((found.crease > 60).sum(axis=1) > 0).mean() > 0.9
+
+
+def test_a_plane_has_no_edges_whatever_cone_it_is_seen_along():
+    rays, _, _ = sweep(64, 30, (60, -60), 7)
+    normal = np.array([0.9, 0.3, -0.2])
+    points = rays * (2 / (rays @ normal))[..., None]
+    points[~(rays @ normal > 0.2)] = np.nan
+    found = edgeStrength(points)
+    assert found.jump.max() < 0.01  # where the ray grazes the plane, 10 away
+    assert found.crease.max() < 2
+    assert not detectEdges(points).any()
+
+
+def test_pixels_that_fly_are_found_all_around():
+    rays, ranges, _ = sweep(64, 15, (180, -180))
+    ranges = np.full_like(ranges, 4.0)
+    ranges[:, 100:200], ranges[:, 99], ranges[:, 200] = 3.0, 3.5, 3.5
+    flying = rangeedge.flyingPixels(rays * ranges[..., None], noise=0.002) > 0
+    assert flying[5:-5, [99, 200]].mean() > 0.9
+    assert not np.delete(flying, [99, 200], axis=1).any()
+
+
+def test_range_images_are_the_points_of_their_angles():
+    rays, ranges, _ = sweep(32, 15, (180, -180))
+    points = rangeedge.sweepToPoints(ranges, np.linspace(15, -15, 32))
+    np.testing.assert_allclose(points, rays * ranges[..., None], atol=1e-12)
+    up, around = np.broadcast_arrays(np.linspace(15, -15, 32)[:, None], np.linspace(180, -180, COLUMNS, endpoint=False))
+    millimetres = np.rint(1000 * ranges).astype(np.uint16)
+    millimetres[3, 4] = 0
+    whole = rangeedge.sweepToPoints(millimetres, up, around)
+    assert np.isnan(whole[3, 4]).all()
+    assert np.isfinite(whole).all(axis=2).sum() == ranges.size - 1
+    np.testing.assert_allclose(np.linalg.norm(whole, axis=2)[5], ranges[5], atol=6e-4)
+    for name, options in (("elevation", {"elevation": [1, 2]}), ("azimuth", {"elevation": up, "azimuth": [np.nan]})):
+        with pytest.raises(rangeedge.error, match=f"sweepToPoints: `{name}` must be"):
+            rangeedge.sweepToPoints(ranges, **options)
+
+
+# Other frames than the sensor's.
+
+
+K = np.array([[140.0, 0, 79.5], [0, 140, 59.5], [0, 0, 1]])
+SHAPE = (120, 160)
+
+
+def rays_of(shape=SHAPE):
+    v, u = np.indices(shape)
+    return np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(shape)], -1)
+
+
+def depth_of(rays, noise=0.001):
+    """A wall, a floor and a card before them."""
+    x, y = rays[..., 0], rays[..., 1]
+    with np.errstate(divide="ignore"):
+        z = np.minimum(3.0, np.where(y > 0, 0.8 / y, np.inf))
+    z = np.where((abs(x) < 0.25) & (y > -0.2) & (y < 0.15), 2.0 + 0.4 * x, z)
+    return z + noise * np.random.default_rng(2).standard_normal(z.shape)
+
+
+def turned(degrees):
+    return cv2.Rodrigues(np.radians(np.array(degrees, float)))[0]
+
+
+@pytest.mark.parametrize("given", [False, True])
+@pytest.mark.parametrize("place", [(0.2, 0, 1.1), (4, -7, 1.1), (430, 250, 1)])
+def test_clouds_in_another_frame(place, given):
+    z = depth_of(rays_of())
+    right = detectEdges(z, K=K)
+    points = (rays_of() * z[..., None]) @ turned((30, 100, -20)).T + np.array(place)
+    options = {"origin": place} if given else {}
+    np.testing.assert_allclose(read_frame(points, ScanLineParams(**options)).origin, place, atol=0.02)
+    edges = detectEdges(points, **options)
+    assert near(edges > 0, right > 0) > 0.98
+    assert near(right > 0, edges > 0) > 0.98
+    assert segmentRegions(points, **options).max() == segmentRegions(z, K=K).max()
+
+
+def test_points_that_are_seen_from_nowhere_are_refused():
+    points = np.random.default_rng(3).normal(size=(20, 30, 3)) + np.array([0, 0, 5])
+    with pytest.raises(rangeedge.error, match="by origin"):
+        edgeStrength(points)
+    good = rays_of() * depth_of(rays_of())[..., None]
+    with pytest.raises(rangeedge.error, match="`origin` must be where the rays of the points meet"):
+        edgeStrength(good, origin=(1, 2, 0))
+    for other in ({"K": K}, {"pixelSize": 1.0}):
+        with pytest.raises(rangeedge.error, match="None where src holds points"):
+            edgeStrength(good, **other)
+    with pytest.raises(rangeedge.error, match="`origin` must be None where src holds no points"):
+        edgeStrength(good[..., 2], K=K, origin=(0, 0, 0))
+    with pytest.raises(rangeedge.error, match="`origin` must be None where heightMap"):
+        edgeStrength(good, heightMap=True, origin=(0, 0, 0))
+
+
+# A lens with distortion.
+
+
+@pytest.mark.parametrize("coefficients", [(-0.25, 0.08, 0, 0), (0.15, -0.1, 0.001, -0.002, 0.02)])
+def test_a_lens_with_distortion(coefficients):
+    v, u = np.indices(SHAPE)
+    pixels = np.stack([u, v], -1).reshape(-1, 1, 2).astype(float)
+    rays = cv2.undistortPoints(pixels, K, np.array(coefficients))[:, 0].reshape(*SHAPE, 2)
+    z = depth_of(np.dstack([rays, np.ones(SHAPE)]))
+    found = edgeStrength(z, K=K, distCoeffs=coefficients)
+    edges = detectEdges(z, K=K, distCoeffs=coefficients)
+    # The edges of the undistorted scene, where the lens shows them.
+    right = detectEdges(depth_of(rays_of()), K=K)
+    v, u = np.nonzero(right)
+    x = np.column_stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(len(u))])
+    seen = cv2.projectPoints(x[:, None], np.zeros(3), np.zeros(3), K, np.array(coefficients))[0][:, 0]
+    seen = np.rint(seen[((seen > 3) & (seen < np.array(SHAPE[::-1]) - 4)).all(axis=1)]).astype(int)
+    there = np.zeros(SHAPE, bool)
+    there[seen[:, 1], seen[:, 0]] = True
+    inner = np.s_[4:-4, 4:-4]
+    assert near(there[inner], edges[inner] > 0, 3) > 0.97
+    assert near(edges[inner] > 0, there[inner], 3) > 0.97
+    corner = (found.crease > 0) & (edges > 0) & (found.jump == 0)
+    assert np.median(found.crease[corner]) == pytest.approx(90, abs=1)
+
+
+def test_no_distortion_changes_nothing():
+    z = depth_of(rays_of())
+    for a, b in zip(edgeStrength(z, K=K), edgeStrength(z, K=K, distCoeffs=np.zeros(5)), strict=True):
+        np.testing.assert_array_equal(a, b)
+    with pytest.raises(rangeedge.error, match="`distCoeffs` must be None where K is not given"):
+        edgeStrength(z, distCoeffs=np.zeros(4))
+
+
+def test_surfaces_of_a_sector_are_found_and_those_all_around_refused():
+    rays, ranges, faces = sweep(64, 20, (50, -50))
+    points = rays * (ranges + 0.003 * np.random.default_rng(4).standard_normal(ranges.shape))[..., None]
+    assert segmentRegions(points).max() == len(np.unique(faces))
+    rays, ranges, _ = sweep(64, 20, (180, -180))
+    with pytest.raises(rangeedge.error, match="segmentRegions: `src` must hold points of a sector"):
+        segmentRegions(rays * ranges[..., None], noise=0.003)
