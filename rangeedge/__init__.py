@@ -6,6 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ._check import error
+from .adjacency import regionAdjacency
 from .chains import EdgeChain, EdgeChains, linkEdges
 from .closure import closeContours
 from .constants import (
@@ -110,6 +111,7 @@ __all__ = [  # noqa: RUF022
     "growRegionsWithStats",
     "segmentRegions",
     "segmentRegionsWithStats",
+    "regionAdjacency",
     "drawEdges",
     "drawChains",
     "drawSegments",

@@ -256,6 +256,21 @@ def test_no_edges_no_chains():
         assert repr(chains) == "<0 edge chains of 0 points>"
 
 
+@pytest.mark.parametrize("cornerAngle", [1, 8, 180])
+def test_points_are_finite_on_images_of_blocks(cornerAngle):
+    """Small loops, short lines, lines at the border and beside holes."""
+    rng = np.random.default_rng(0)
+    for size in (1, 2, 3, 4, 6):
+        depth = np.kron(rng.uniform(1, 2, (12, 15)).round(1), np.ones((size, size)))
+        depth[rng.random(depth.shape) < 0.03] = np.nan
+        options = {"cornerAngle": cornerAngle, "bridge": 40, "minLength": 1, "lineSignificance": 0, "noise": 0.001}
+        chains = linkEdges(depth, pixelSize=0.01, **options)
+        for name in ("x", "y", "point"):
+            assert np.isfinite(chains.points[name]).all()
+        assert (chains.points["x"] > -1).all()
+        assert (chains.points["x"] < depth.shape[1]).all()
+
+
 def test_chains_are_a_sequence_and_print(chains):
     assert isinstance(chains, EdgeChains)
     assert all(isinstance(chain, EdgeChain) for chain in chains)

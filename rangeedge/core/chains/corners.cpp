@@ -137,7 +137,7 @@ private:
         for (std::ptrdiff_t k = first; k <= last; ++k) window_.push_back(at(k));
         const int split = best_split();
         if (split < 0) return 0;
-        found_[i] = std::min(std::max<std::ptrdiff_t>(first + split, 0), size() - 1);
+        found_[i] = (first + split + size()) % size();
         const int n = static_cast<int>(window_.size());
         return gain(two_lines(window_.data(), n, split), n);
     }
@@ -165,16 +165,17 @@ private:
         for (std::ptrdiff_t i = 0; i < found_.size(); ++i) gains[i] = confirmed_gain(i);
         while (!found_.empty()) {
             const std::ptrdiff_t least = std::min_element(gains.begin(), gains.end()) - gains.begin();
-            if (gains[least] >= least_gain) return;
+            if (gains[least] >= least_gain) break;
             std::copy(gains.begin() + least + 1, gains.end(), gains.begin() + least);
             std::copy(found_.begin() + least + 1, found_.end(), found_.begin() + least);
             const std::ptrdiff_t count = found_.size() - 1;
             gains.resize(count), found_.resize(count);
-            if (!count) return;
+            if (!count) break;
             const std::ptrdiff_t before = (least + count - 1) % count, after = least % count;
             gains[before] = confirmed_gain(before);
             if (after != before) gains[after] = confirmed_gain(after);
         }
+        std::sort(found_.begin(), found_.end());  // of a closed chain one may have moved past its first point
     }
 
     // Adds corners between those found and the ends, of which a longer stretch tells than what `look` has looked at.

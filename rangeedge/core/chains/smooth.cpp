@@ -80,7 +80,7 @@ private:
     ChainPoint& point(std::ptrdiff_t k) { return result_.points[static_cast<std::size_t>(k)]; }
 
     std::ptrdiff_t neighbour(std::ptrdiff_t k, std::ptrdiff_t step) const {
-        if (chain_.closed) return (k + step + places()) % places();
+        if (chain_.closed) return ((k + step) % places() + places()) % places();  // a step may lead around
         return std::min(std::max<std::ptrdiff_t>(k + step, 0), places() - 1);
     }
 
