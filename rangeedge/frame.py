@@ -96,10 +96,10 @@ class Frame:
             z = 1 / self.ordinate.astype(np.float64)
         return np.stack([x * z, y * z, z], axis=-1)
 
-    def toward_viewer(self, point: np.ndarray) -> np.ndarray:
-        """The direction toward the viewer from one of `points`."""
+    def toward_viewer(self, points: np.ndarray) -> np.ndarray:
+        """The directions toward the viewer from points (..., 3)."""
         if self.projective:
-            return np.asarray(self.origin) - point
+            return np.asarray(self.origin) - points
         if self.samples.ndim == 3:
             return -np.asarray(self.axis)
         return np.array([0.0, 0.0, 1.0 if self.heightMap else -1.0])

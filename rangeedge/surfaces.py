@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -69,10 +68,41 @@ def _places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[f
 def surfaces_of(frame: Frame, labels: np.ndarray, count: int) -> np.ndarray:
     """The plane, or the quadric where a plane fails, of every label 1 .. count - 1."""
     surfaces = np.zeros(count, SURFACE)
-    with np.errstate(invalid="ignore", over="ignore"):  # signalling NaN; beyond single precision
-        relative = (ordinate - ordinate.dtype.type(offset)).astype(np.float32, copy=False)
-    rounding = float(np.spacing(np.abs(ordinate.dtype.type(offset))))
-    return _core.RangeMap(frame.kernel, x, y, relative, offset, rounding, to_plane, edges)
+    points = frame.points
+    origins, scales = np.zeros((count, 3)), np.ones(count)
+    moments, curved = np.zeros((count, len(_EXPONENTS))), np.zeros(count, np.uint8)
+    ordinate = _along_axis(frame).astype(np.float64, copy=False)
+    _core.region_moments(labels, points, ordinate, frame.threads, origins, scales, moments, curved)
+    # Planes and quadrics in (p - origin) / scale, as coefficients of _TERMS and 1, with a gradient of about 1.
+    mean, normal, rms = _planes(moments)
+    quadrics = np.concatenate([np.zeros((count, 6)), normal, -(normal * mean).sum(axis=1, keepdims=True)], axis=1)
+    curved = curved.view(bool)
+    quadrics[curved] = _taubin(moments[curved])
+    misfits = np.zeros(count)
+    floors = np.where(curved, _LEAST_GRADIENT, 0.0)
+    _core.quadric_misfits(labels, points, frame.threads, origins, scales, quadrics, floors, misfits)
+    normal = np.where(curved[:, None], _gradients(quadrics, mean), normal)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+        centroid = origins + scales[:, None] * mean
+        sign = np.where((normal * frame.toward_viewer(centroid)).sum(axis=1) < 0, -1.0, 1.0)[:, None]
+        for name, values in (
+            ("curved", curved),
+            ("centroid", centroid),
+            ("normal", sign * normal),
+            ("quadric", sign * _in_lengths(quadrics, origins, scales)),
+            ("rms", scales * np.where(curved, misfits, rms)),
+        ):
+            surfaces[name][1:] = values[1:]
+    return surfaces
+
+
+def _planes(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mean points, normals of the planes through them, and root mean square distances from these."""
+    mean = moments[:, [_PLACE[e] for e in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]]
+    second = [[_PLACE[tuple(a + b)] for b in np.eye(3, dtype=int)] for a in np.eye(3, dtype=int)]
+    values, vectors = np.linalg.eigh(moments[:, second] - mean[:, :, None] * mean[:, None, :])
+    return mean, vectors[:, :, 0], np.sqrt(np.maximum(values[:, 0], 0.0))
 
 
 def _taubin(moments: np.ndarray) -> np.ndarray:

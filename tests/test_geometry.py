@@ -6,6 +6,7 @@ import pytest
 import rangeedge
 from rangeedge import CREASE_MAX, edgePoints, edgeStrength
 from rangeedge.frame import read_frame
+from rangeedge.geometry import range_frame
 from rangeedge.options import ScanLineParams
 from rangeedge.synthetic import (
     Camera,
@@ -299,3 +300,11 @@ def test_whole_heights_may_be_negative():
     np.testing.assert_array_equal(frame.ordinate[0], np.float32(heights[0] / 10))
     assert frame_of(heights).valid.sum() == 199
     assert frame_of(heights.clip(0).astype(np.uint16), heightMap=True).valid.sum() == 199
+
+
+def test_frames_are_read_by_keyword_and_errors_name_the_caller():
+    frame = range_frame("mine", np.full((4, 5), 2.0, np.float32), K=(5, 5, 2, 1.5), mask=np.eye(4, 5, dtype=np.uint8))
+    assert frame.projective
+    assert np.array_equal(frame.valid, np.eye(4, 5))
+    with pytest.raises(rangeedge.error, match="mine: `K`"):
+        range_frame("mine", np.ones((4, 5)), K=3)
