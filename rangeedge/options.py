@@ -320,7 +320,10 @@ class ScanLineParams(Options):
 
     @classmethod
     def paper(cls, **options: Any) -> ScanLineParams:
-        """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept."""
+        """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept.
+
+        All of its lines are edges with the option `lineSignificance` = 0 of the selection.
+        """
         basic = {"fit": FIT_INTERP, "crease": CREASE_MAX, "maxShift": 0.0, "maxGap": 0, "maxSmear": 0}
         kept = {"shadowEdges": False, "mergeSignificance": 0.0, "minSignificance": 0.0}
         return cls(**{**basic, **kept, **options})
