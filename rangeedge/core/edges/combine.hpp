@@ -1,8 +1,8 @@
 // The combination of the four directions into maps of pixels (paper, 4.2): of several candidates a pixel takes the
 // largest jump and the largest crease, and the type, convex or concave, of that crease. Both pixels beside a cut take
-// part. A jump has no crease: surfaces either meet at a pixel or do not: of its jumps and creases, the most significant candidate decides
-// which the pixel is. The crease of the default setting, the angle between surface normals, is found before, from the
-// candidates of several directions together (normals.hpp).
+// part. Surfaces either meet at a pixel or do not: of its jumps and creases, the most significant candidate decides
+// which the pixel is, and one with a jump has no crease. The crease of the default setting, the angle between surface
+// normals, is found before, from the candidates of several directions together (normals.hpp).
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>

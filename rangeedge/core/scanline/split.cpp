@@ -48,7 +48,8 @@ RANGEEDGE_INLINE int first_invalid_in(const float* y, int k, int n) {
 RANGEEDGE_VERSIONS(int, first_valid, (const float* y, int k, int n), (y, k, n))
 RANGEEDGE_VERSIONS(int, first_invalid, (const float* y, int k, int n), (y, k, n))
 
-// The quadratic through both end points and the midpoint (paper, 4.1), y = ym + t (b + a t) with t counted from the midpoint.
+// The quadratic through both end points and the midpoint (paper, 4.1), y = ym + t (b + a t) with t counted from the
+// midpoint.
 template <class T>
 struct ThreePoint {
     int m;
