@@ -15,6 +15,7 @@ from .forms import SRC, range_array
 from .noise_model import WHITE, NoiseModel
 from .options import ScanLineParams
 from .plausible import warn_of_dropped
+from .sectors import Turn, turn_of
 from .viewpoint import distorted_rays, view_of
 
 _THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
@@ -58,6 +59,16 @@ class Frame:
     def threads(self) -> int:
         """How many threads the image is worth."""
         return threads_worth(self.shape[0] * self.shape[1])
+
+    @cached_property
+    def turn(self) -> Turn | None:
+        """How far the image looks around, where that is too far for one axis of view."""
+        return turn_of(self.samples) if self.ranges else None
+
+    @property
+    def seam(self) -> int | None:
+        """The axis along which first and last line are neighbours: 1 where rows wrap; None where there is none."""
+        return self.turn.axis if self.turn and self.turn.closed else None
 
     @cached_property
     def ordinate(self) -> np.ndarray:

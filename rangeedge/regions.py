@@ -15,6 +15,7 @@ from .distance import distanceTransform
 from .frame import Frame
 from .noise import measured_frame
 from .options import GROWING, SEGMENTING, Growing, ScanLineParams, Selection
+from .sectors import around
 from .seeds import find_seeds, label_statistics
 from .surfaces import surface_map, surfaces_of
 
@@ -258,8 +259,8 @@ def _segmented(
 
 def seeded_regions(frame: Frame, edges: np.ndarray, growing: Growing) -> tuple[np.ndarray, np.ndarray]:
     """Seeds between the edges of a checked range image, and the regions that grow from them."""
-    distance = distanceTransform((edges != 0) | (frame.valid == 0))
-    _, seeds = find_seeds(distance, growing, None)
+    distance = around(frame, distanceTransform, (edges != 0) | (frame.valid == 0))
+    seeds = around(frame, lambda distance, wrap: find_seeds(distance, growing, None, wrap)[1], distance)
     return seeds, _grow(frame, seeds, edges, growing, True)
 
 
