@@ -17,10 +17,10 @@ def components(mask: np.ndarray, wrap: bool) -> tuple[int, np.ndarray]:
     last = np.tile(labels[:, -1], 3)
     first = np.concatenate([around[dy : dy + len(labels), -1] for dy in range(3)])
     touching = (last > 0) & (first > 0)
-    return count, _joined(count, last[touching], first[touching])[labels]
+    return count, joined(count, last[touching], first[touching])[labels]
 
 
-def _joined(count: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+def joined(count: int, first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """The least label of what such pairs of labels join, for every label."""
     least = np.arange(count, dtype=np.int32)
     while (least[first] != least[second]).any():

@@ -58,6 +58,11 @@ class Sector(NamedTuple):
         """Values of all pixels at those of this sector."""
         return np.take(values, self.lines(values.shape[self.axis]), self.axis)
 
+    def spread(self, whole: np.ndarray, values: np.ndarray) -> None:
+        """Write values of its pixels into those of all pixels, also where other sectors see them."""
+        lines = self.lines(whole.shape[self.axis])
+        whole[(slice(None), lines) if self.axis else lines] = values
+
     def lines(self, count: int) -> np.ndarray:
         """Which of the `count` lines of the whole its own are."""
         return (np.arange(self.frame.shape[self.axis]) + self.start - self.first) % count

@@ -149,7 +149,8 @@ def selectEdges(*args: Any, **options: Any) -> np.ndarray:
 
     With what `edgeStrength` returns, this is the selection of `detectEdges` with its defaults, so that
     ``thinEdges(selectEdges(strength, ...))`` is the same map: jumps count on their nearer side, and creases where
-    three of their neighbours are creases as well, lest lines fray. With maps of jump and crease every pixel counts.
+    three of their neighbours are creases as well, lest lines fray; of a scan all around with ``wrap=True`` for both.
+    With maps of jump and crease every pixel counts.
 
     The steps run in this order, each on what the one before has left:
 
