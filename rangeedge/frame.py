@@ -192,6 +192,10 @@ def checked(src: np.ndarray, params: ScanLineParams) -> tuple[np.ndarray, np.nda
         raise fail("heightMap", "False where K is given (its values are depths)", params.heightMap)
     if K is None and params.distCoeffs is not None:
         raise fail("distCoeffs", "None where K is not given", described(params.distCoeffs))
+    if K is None and params.imageSize is not None:
+        raise fail("imageSize", "None where K is not given", described(params.imageSize))
+    if params.imageSize is not None and params.imageSize != (src.shape[1], src.shape[0]):
+        raise _other_size(src.shape, params.imageSize)
     for name in ("K", "pixelSize") if points else ("origin",):
         if getattr(params, name) is not None:
             form = "points" if points else "no points"
@@ -199,6 +203,18 @@ def checked(src: np.ndarray, params: ScanLineParams) -> tuple[np.ndarray, np.nda
     if params.origin is not None and params.heightMap:
         raise fail("origin", "None where heightMap is given (its lines of sight are parallel)", params.origin)
     return src, seen
+
+
+def _other_size(shape: tuple[int, ...], size: tuple[int, int]) -> Exception:
+    """What to say of an image that K does not hold for."""
+    (width, height), (own_width, own_height) = size, (shape[1], shape[0])
+    x, y = own_width / width, own_height / height
+    return error(
+        f"`src` has {own_width} x {own_height} pixels, but K holds for {width} x {height}: where the image was resized,"
+        f" give (x fx, y fy, x (cx + 0.5) - 0.5, y (cy + 0.5) - 0.5) with x = {x:.6g} and y = {y:.6g}; where it was"
+        " cropped, subtract its first column and row from cx and cy; or say by imageSize what K holds for",
+        cv2.Error.StsUnmatchedSizes,
+    )
 
 
 def _holds(src: np.ndarray, ranges: tuple[tuple[float, float], ...]) -> np.ndarray:
