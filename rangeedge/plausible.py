@@ -22,6 +22,8 @@ _FORMATS = {  # of depth cameras
     *((1024, 768), (1024, 1024), (1280, 720), (1280, 800), (1280, 960), (1280, 1024), (1920, 1080), (1944, 1200)),
 }
 _LEAST_ZEROS = 0.01  # share of the pixels, that zeros stand for no data
+_FARTHER = 5.0  # times all others, that a value stands for no data
+_FLAT = 0.1  # of the sides of an image, in units of its values: depths of a camera whose pixels count as 1 apart
 _LEAST_IMAGE = 64 * 64  # pixels of what a camera may have taken
 _FAR_FROM_ZERO = 0.1  # of the median, above which all other depths lie then
 _MOST_DROPPED = 0.1  # share of the points
@@ -46,7 +48,9 @@ def question_geometry(src: np.ndarray, frame: Frame, params: ScanLineParams) -> 
     plain = src.ndim == 2 and params.K is None and params.pixelSize is None and not params.heightMap
     if plain and params.invalid is None:
         _refuse_zeros(src)
-    _warn_of_form(src, plain)
+    if params.invalid is None and src.ndim == 2:
+        _warn_of_outlier(src, frame)
+    _warn_of_form(src, frame, plain)
     if src.dtype.kind in "iu" and params.K is not None:
         _warn_of_factor(frame.ordinate[::8, ::8], params.depthFactor)
 
@@ -66,15 +70,42 @@ def _refuse_zeros(src: np.ndarray) -> None:
         )
 
 
-def _warn_of_form(src: np.ndarray, plain: bool) -> None:
+def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
+    """Warn of a value that many pixels have, and that is far from all others: it hardly is a depth."""
+    coarse = src[::4, ::4][frame.valid[::4, ::4] > 0]
+    if src.size < _LEAST_IMAGE or not len(coarse):
+        return
+    for value in (coarse.max(), coarse.min()):
+        others = coarse[coarse != value].astype(np.float64)
+        if not len(others) or len(coarse) - len(others) < _LEAST_ZEROS * len(coarse):
+            continue
+        largest = np.abs(others).max()
+        below = value < 0 <= others.min() and -float(value) > largest
+        if (below or abs(float(value)) / _FARTHER > largest) and largest > 0:
+            warn(
+                f"`src` is {value:g} at {np.count_nonzero(src == value)} of {src.size} pixels, far from all others: say"
+                f" invalid={value:g} if these have no data, invalid=() if they have"
+            )
+
+
+def _warn_of_form(src: np.ndarray, frame: Frame, plain: bool) -> None:
     if src.dtype.kind in "iu" and src.dtype.itemsize == 1:
         warn("`src` has 8 bits, too coarse for edges: pass the depths as the sensor gave them, in 16 bits or floats")
     size = (src.shape[1], src.shape[0])
-    if plain and src.dtype == np.uint16 and (size in _FORMATS or size[::-1] in _FORMATS):
+    if not plain or (size not in _FORMATS and size[::-1] not in _FORMATS):
+        return
+    holes = np.count_nonzero(frame.valid) < (1 - _LEAST_ZEROS) * src.size
+    if src.dtype == np.uint16 or (src.dtype.kind == "f" and holes and 0 < _positive_extent(frame) < _FLAT * min(size)):
         warn(
-            f"`src` looks like the image of a depth camera ({size[0]} x {size[1]}, 16 bits), but K is not given: angles"
-            " and noise are those of a grid with a spacing of 1; give K, or pixelSize where it is a grid"
+            f"`src` looks like the image of a depth camera ({size[0]} x {size[1]}, {src.dtype}), but K is not given:"
+            " angles and noise are those of a grid with a spacing of 1; give K, or pixelSize where it is a grid"
         )
+
+
+def _positive_extent(frame: Frame) -> float:
+    """The range of depths, 0 where some are not positive."""
+    ordinates = frame.ordinate[::8, ::8]
+    return _extent(ordinates, False) if np.nanmax(np.append(ordinates, -np.inf)) < 0 else 0.0
 
 
 def _warn_of_factor(ordinates: np.ndarray, factor: float) -> None:
