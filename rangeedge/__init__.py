@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._check import error
 from .adjacency import regionAdjacency
+from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
 from .closure import closeContours
 from .constants import (
@@ -71,6 +72,7 @@ __version__ = "0.1.0"
 __all__ = [  # noqa: RUF022
     "error",
     "RangeEdgeWarning",
+    "Cancellation",
     "RangeImage",
     "imreadRange",
     "imwriteRange",

@@ -20,7 +20,7 @@ import rangeedge
 from rangeedge import _core
 
 PUBLIC = """
-    error RangeEdgeWarning RangeImage imreadRange imwriteRange sweepToPoints backproject project NoiseModel
+    error RangeEdgeWarning Cancellation RangeImage imreadRange imwriteRange sweepToPoints backproject project NoiseModel
     estimateNoise ScanLineParams splitScanLine EdgeStrength edgeStrength edgePoints kindNames flyingPixels
     strengthImage overallStrength selectEdges thinEdges detectEdges detectEdgesWithStrength ScanLineDetector
     createScanLineDetector EdgeChain EdgeChains linkEdges Segments fitSegments writeLines closeContours

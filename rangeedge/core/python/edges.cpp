@@ -16,7 +16,7 @@ template <class T>
 auto split_scan_line(const Values<T>& y, const Values<T>& x, double eps) {
     std::vector<Segment> segments;
     {
-        nb::gil_scoped_release release;
+        const Unlock unlock;
         std::vector<T> samples(y.data(), y.data() + y.size());
         samples.resize(y.size() + padding);
         Splitter<T> splitter;
@@ -56,7 +56,7 @@ Columns columns(const std::vector<Candidate>& candidates) {
 Columns edge_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads) {
     std::vector<Candidate> candidates;
     {
-        nb::gil_scoped_release release;
+        const Unlock unlock;
         candidates = candidates_of(frame, options, threads);
         put_in_order(candidates);
     }
@@ -81,7 +81,7 @@ Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOpti
                                      const Strengths& significance) {
     std::vector<Candidate> candidates;
     {
-        nb::gil_scoped_release release;
+        const Unlock unlock;
         candidates = candidates_of(frame, options, threads);
         fill(frame, candidates, jump, crease, kind, significance);
         put_in_order(candidates);
