@@ -63,15 +63,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(argv)
     run: Callable[[argparse.Namespace], int] = args.run
     try:
-        return run(args)
+        code = run(args)
+        sys.stdout.flush()
+        return code
     except error as problem:
         print(problem.msg, file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # the reader of the output has had enough, as in `rangeedge bench | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence()
         return 1
+    except OSError as problem:  # what is found was written, what is said about it could not be
+        _silence()
+        print(f"rangeedge: error: cannot write what is to be said: {problem.strerror or problem}", file=sys.stderr)
+        return 1
+
+
+def _silence() -> None:
+    """Nothing more goes to the standard output, not even what is still on its way."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> argparse.ArgumentParser:

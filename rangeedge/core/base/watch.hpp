@@ -19,7 +19,7 @@ struct Stopped : std::exception {
 
 class Watch {
 public:
-    static constexpr std::chrono::milliseconds period{20};
+    static constexpr std::chrono::milliseconds period{50};
 
     // `ask` is called once a period, on this thread, while the watch lasts.
     explicit Watch(std::function<void()> ask)
