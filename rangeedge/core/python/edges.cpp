@@ -94,9 +94,9 @@ void flying_pixels(const BoundFrame& bound, const ScanLineOptions& options, int 
     std::visit([&](const auto& frame) { find_candidates(frame, options, threads, flying.data()); }, bound.frame);
 }
 
-void bound_keep_lines(const Image<std::uint8_t>& edges, int min_length, const Image<float>& significance,
+void bound_keep_lines(const Image<std::uint8_t>& edges, bool wrap, int min_length, const Image<float>& significance,
                       double least_significance, const OutImage<std::uint8_t>& kept) {
-    keep_lines(edges.data(), rows(edges), cols(edges), min_length, significance.data(), least_significance,
+    keep_lines(edges.data(), rows(edges), cols(edges), wrap, min_length, significance.data(), least_significance,
                kept.data());
 }
 
@@ -125,7 +125,7 @@ void bind_edges(nb::module_& m) {
     m.def("flying_pixels", &flying_pixels, "frame"_a, "options"_a, "threads"_a, array("flying"), Unlocked());
     m.def("thin_lines", &thin_to_lines, array("edges"), optional_array("preferred"), "spur_length"_a, array("thin"),
           Unlocked());
-    m.def("keep_lines", &bound_keep_lines, array("edges"), "min_length"_a, optional_array("significance"),
+    m.def("keep_lines", &bound_keep_lines, array("edges"), "wrap"_a, "min_length"_a, optional_array("significance"),
           "least_significance"_a, array("kept"), Unlocked());
 }
 
