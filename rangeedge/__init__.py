@@ -9,8 +9,12 @@ from ._check import error
 from .adjacency import regionAdjacency
 from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
+from .cleaning import cleanDepth
 from .closure import closeContours
 from .constants import (
+    CLEAN_FILLED,
+    CLEAN_REMOVED,
+    CLEAN_SMOOTHED,
     CREASE_MAX,
     CREASE_NORMAL,
     DIR_ALL,
@@ -114,6 +118,7 @@ __all__ = [  # noqa: RUF022
     "segmentRegions",
     "segmentRegionsWithStats",
     "regionAdjacency",
+    "cleanDepth",
     "drawEdges",
     "drawChains",
     "drawSegments",
@@ -137,6 +142,9 @@ __all__ = [  # noqa: RUF022
     "EDGE_OCCLUDING",
     "EDGE_OCCLUDED",
     "EDGE_BOUNDARY",
+    "CLEAN_SMOOTHED",
+    "CLEAN_REMOVED",
+    "CLEAN_FILLED",
     "THIN_SKELETON",
     "THIN_LEE",
     "THIN_ITERATIVE",
