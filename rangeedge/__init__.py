@@ -50,6 +50,7 @@ from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
 from .draw_lines import drawChains, drawSegments
 from .edges import EdgeStrength, edgePoints, edgeStrength, kindNames, splitScanLine
 from .flying import flyingPixels
+from .frames import mapFrames
 from .io import RangeImage, imreadRange, imwriteRange
 from .io.lines import writeLines
 from .noise import estimateNoise
@@ -100,6 +101,7 @@ __all__ = [  # noqa: RUF022
     "detectEdgesWithStrength",
     "ScanLineDetector",
     "createScanLineDetector",
+    "mapFrames",
     "EdgeChain",
     "EdgeChains",
     "linkEdges",

@@ -23,7 +23,7 @@ PUBLIC = """
     error RangeEdgeWarning Cancellation RangeImage imreadRange imwriteRange sweepToPoints backproject project NoiseModel
     estimateNoise ScanLineParams splitScanLine EdgeStrength edgeStrength edgePoints kindNames flyingPixels
     strengthImage overallStrength selectEdges thinEdges detectEdges detectEdgesWithStrength ScanLineDetector
-    createScanLineDetector EdgeChain EdgeChains linkEdges Segments fitSegments writeLines closeContours
+    createScanLineDetector mapFrames EdgeChain EdgeChains linkEdges Segments fitSegments writeLines closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
     extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats
     regionAdjacency cleanDepth
