@@ -41,9 +41,17 @@ from .distance import (
     salienceDistanceTransform,
     salienceDistanceTransformWithLabels,
 )
-from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
-from .draw_lines import drawChains, drawSegments
+from .draw import (
+    colorizeDistance,
+    drawChains,
+    drawEdges,
+    drawExplanation,
+    drawOverview,
+    drawRegions,
+    drawSegments,
+)
 from .edges import EdgeStrength, edgePoints, edgeStrength, kindNames, splitScanLine
+from .explain import Explanation, explainPixel
 from .flying import flyingPixels
 from .io import RangeImage, imreadRange, imwriteRange
 from .io.lines import writeLines
@@ -92,6 +100,8 @@ __all__ = [  # noqa: RUF022
     "thinEdges",
     "detectEdges",
     "detectEdgesWithStrength",
+    "Explanation",
+    "explainPixel",
     "ScanLineDetector",
     "createScanLineDetector",
     "EdgeChain",
@@ -118,6 +128,7 @@ __all__ = [  # noqa: RUF022
     "drawRegions",
     "colorizeDistance",
     "drawOverview",
+    "drawExplanation",
     "DIR_ROWS",
     "DIR_COLS",
     "DIR_DIAG45",

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import cv2
 import numpy as np
 
-from ._check import deliver, described, fail, integer, public
-from .chains import EdgeChain, EdgeChains
-from .draw import KINDS, backdrop
-from .segments import SEGMENT, VERTEX
+from .._check import deliver, described, fail, integer, public
+from ..chains import EdgeChain, EdgeChains
+from ..segments import SEGMENT, VERTEX
+from .palette import kind_colour
+from .relief import backdrop
 
 _SHIFT = 4  # binary digits of fractions of a pixel
 _VERTEX = (255, 255, 255)
@@ -71,7 +72,7 @@ def drawChains(
         _line(canvas, places, chain.kind, scale, closed=chain.closed)
         if not chain.closed:
             for end in places[[0, -1]]:
-                _dot(canvas, end, _colour(chain.kind), scale)
+                _dot(canvas, end, kind_colour(chain.kind), scale)
     return deliver("dst", canvas, dst)
 
 
@@ -141,10 +142,6 @@ def _canvas(src: np.ndarray, scale: int, K: np.ndarray | None, heightMap: bool) 
     return canvas, scale
 
 
-def _colour(kind: int) -> tuple[int, int, int]:
-    return next((colour for bit, colour, _ in reversed(KINDS) if kind & bit), _VERTEX)
-
-
 def _fixed(places: np.ndarray, scale: int) -> np.ndarray:
     """Places as integers of OpenCV, pixel centres being whole numbers in the image as in the picture."""
     return np.rint(((places + 0.5) * scale - 0.5) * (1 << _SHIFT)).astype(np.int32)
@@ -152,7 +149,7 @@ def _fixed(places: np.ndarray, scale: int) -> np.ndarray:
 
 def _line(canvas: np.ndarray, places: np.ndarray, kind: int, scale: int, *, closed: bool = False) -> None:
     width = max(1, (scale + 1) // 2)
-    cv2.polylines(canvas, [_fixed(places, scale)], closed, _colour(kind), width, cv2.LINE_AA, _SHIFT)
+    cv2.polylines(canvas, [_fixed(places, scale)], closed, kind_colour(kind), width, cv2.LINE_AA, _SHIFT)
 
 
 def _dot(canvas: np.ndarray, place: np.ndarray, colour: tuple[int, int, int], scale: int) -> None:
