@@ -47,6 +47,7 @@ from .draw import (
     drawEdges,
     drawExplanation,
     drawOverview,
+    drawPanels,
     drawRegions,
     drawSegments,
 )
@@ -128,6 +129,7 @@ __all__ = [  # noqa: RUF022
     "drawRegions",
     "colorizeDistance",
     "drawOverview",
+    "drawPanels",
     "drawExplanation",
     "DIR_ROWS",
     "DIR_COLS",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import cv2
@@ -36,8 +36,7 @@ _NEARBY = 3  # pixels, up to which an edge is named
 _TESTS = ("gap", "single", "smooth", "smeared", "significance")  # in the order in which cuts get to them
 
 
-@dataclass(frozen=True)
-class Explanation:
+class Explanation(NamedTuple):
     """What `explainPixel` returns; `print` shows it in words, `drawExplanation` as a picture."""
 
     x: int
@@ -56,6 +55,9 @@ class Explanation:
     kind: int
     significance: float
     lines: tuple[ScanLine, ...]
+
+    def __repr__(self) -> str:
+        return f"Explanation(x={self.x}, y={self.y}, edge={self.edge}, stage={self.stage!r}, change={self.change})"
 
     def __str__(self) -> str:
         return "\n".join(_said(self))

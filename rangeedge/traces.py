@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NamedTuple
 
@@ -28,8 +27,7 @@ _LONE = 3.0  # standard deviations that a candidate needs by itself, as core/edg
 Candidates = dict[str, np.ndarray]
 
 
-@dataclass(frozen=True)
-class Cut:
+class Cut(NamedTuple):
     """A cut of a scan line between two segments, and what became of it."""
 
     sample: float  # position along the line, in samples of it
@@ -55,8 +53,7 @@ class Cut:
         return kindNames(self.bits)
 
 
-@dataclass(frozen=True)
-class ScanLine:
+class ScanLine(NamedTuple):
     """The scan line of one direction around a pixel."""
 
     direction: int  # DIR_*

@@ -4,7 +4,7 @@ from .distance import colorizeDistance
 from .edges import drawEdges
 from .explanation import drawExplanation
 from .lines import drawChains, drawSegments
-from .overview import drawOverview, region_overview
+from .overview import drawOverview, drawPanels, region_overview
 from .regions import drawRegions
 
 __all__ = [
@@ -13,6 +13,7 @@ __all__ = [
     "drawEdges",
     "drawExplanation",
     "drawOverview",
+    "drawPanels",
     "drawRegions",
     "drawSegments",
     "region_overview",

@@ -2,26 +2,33 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from .. import _check
+from .._option import takes
+from ..options import GEOMETRY
 from .palette import colour_index, paint
 from .relief import backdrop
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
-@_check.public
+    from .._typed import GeometryOptions
+
+
+@takes(GEOMETRY)
 def drawEdges(
     src: np.ndarray,
     edges: np.ndarray,
     kind: np.ndarray | None = None,
     dst: np.ndarray | None = None,
-    *,
-    K: np.ndarray | None = None,
-    heightMap: bool = False,
+    **geometry: Unpack[GeometryOptions],
 ) -> np.ndarray:
     """Draw edges over the shaded relief of a range image, or over a picture.
 
-    drawEdges(src, edges[, kind[, dst]], *[, K[, heightMap]]) -> dst
+    drawEdges(src, edges[, kind[, dst]], *[, K[, ...]]) -> dst
 
     With `kind`: jump vermilion on the near side and purple on the far side, convex yellow, concave blue, beside no data
     grey, anything else white; a jump hides a crease. Without it every edge is white. Pixels without data are hatched.
@@ -36,9 +43,7 @@ def drawEdges(
         Bits `EDGE_JUMP`, `EDGE_CONVEX`, ... of every pixel, as :func:`edgeStrength` returns them.
     dst : ndarray of shape (H, W, 3), CV_8U, optional
         Receives the result where shape and type fit; it may be `src` itself.
-    K, heightMap
-        Geometry of a range image, as for :func:`edgeStrength`: a camera matrix makes 0 and negative values no data,
-        `heightMap` makes larger values nearer.
+    {options}
 
     Returns
     -------
@@ -58,7 +63,7 @@ def drawEdges(
     >>> drawEdges(depth, edges)[0, 2]
     array([255, 255, 255], dtype=uint8)
     """
-    canvas = backdrop(src, K, heightMap)
+    canvas = backdrop(src, geometry)
     edges = _check.image8("edges", edges, canvas.shape[:2])
     kind = None if kind is None else _check.image8("kind", kind, edges.shape)
     paint(canvas, colour_index(edges != 0, kind))

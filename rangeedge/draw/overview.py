@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import cv2
 import numpy as np
 
 from .. import _check
+from .._option import parsed, takes
 from ..frame import read_frame
-from ..options import ScanLineParams
+from ..options import GEOMETRY, ScanLineParams
 from ..selection import strengthImage
 from .distance import checked_distance, distance_colours
 from .palette import KINDS, PLAIN, colour_index, paint
 from .regions import drawRegions
 from .relief import hatch, relief_of, subdued
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .._typed import GeometryOptions
 
 _BACKGROUND = (32, 32, 32)
 _INK = (235, 235, 235)
@@ -20,7 +29,7 @@ _FONT, _FONT_SCALE, _BAR = cv2.FONT_HERSHEY_SIMPLEX, 0.55, 28
 _PANEL_MIN, _PANEL_MAX = 320, 640  # longer side of a panel in pixels
 
 
-@_check.public
+@takes(GEOMETRY)
 def drawOverview(
     src: np.ndarray,
     strength: tuple[np.ndarray, ...],
@@ -30,12 +39,11 @@ def drawOverview(
     title: str | None = None,
     jumpCut: float | None = None,
     creaseCut: float = 64.0,
-    K: np.ndarray | None = None,
-    heightMap: bool = False,
+    **geometry: Unpack[GeometryOptions],
 ) -> np.ndarray:
     """Show a range image and what was found in it in one labelled picture.
 
-    drawOverview(src, strength, edges[, distance], *[, title[, jumpCut[, creaseCut[, K[, heightMap]]]]]) -> retval
+    drawOverview(src, strength, edges[, distance], *[, title[, jumpCut[, creaseCut[, K[, ...]]]]]) -> retval
 
     The panels: shaded relief, strength of jump and of crease, the kinds of all candidates, the selected edges over
     the relief, and the distance map; below them the key to the colours.
@@ -54,8 +62,7 @@ def drawOverview(
         A line above the panels.
     jumpCut, creaseCut : float
         Strengths shown white, > 0; by default the median jump, and 64 degrees.
-    K, heightMap
-        As for :func:`drawEdges`.
+    {options}
 
     Returns
     -------
@@ -76,7 +83,7 @@ def drawOverview(
     >>> drawOverview(depth, (none, none, kind, none), kind).dtype
     dtype('uint8')
     """
-    depth = read_frame(src, ScanLineParams(K=K, heightMap=heightMap)).depth
+    depth = read_frame(src, parsed(geometry, ScanLineParams)[0]).depth
     jump, crease, kind = _strength(strength, depth.shape)
     edges = _check.image8("edges", edges, depth.shape) != 0
     if distance is not None:
@@ -92,7 +99,7 @@ def drawOverview(
     relief = _resized(relief_of(depth), size)
     black = np.zeros_like(relief)
     panels = [
-        (_depth_caption(depth, heightMap), relief),
+        (_depth_caption(depth, geometry.get("heightMap", False)), relief),
         (f"Jump strength, white from {jumpCut:.3g}", _grey(jump, jumpCut, size)),
         (f"Crease strength, white from {creaseCut:.3g} deg", _grey(crease, creaseCut, size)),
         ("Kinds of all candidates", paint(black, _thick(colour_index(kind != 0, kind), size))),
@@ -102,6 +109,59 @@ def drawOverview(
         caption, picture = _distance_panel(distance, np.isfinite(depth))
         panels.append((caption, _resized(picture, size)))
     return _sheet(panels, title)
+
+
+@_check.public
+def drawPanels(
+    panels: Sequence[tuple[str, np.ndarray]], columns: int | None = None, *, key: bool = False
+) -> np.ndarray:
+    """Show pictures beside each other, each under its title.
+
+    drawPanels(panels[, columns], *[, key]) -> retval
+
+    Parameters
+    ----------
+    panels : sequence of (str, ndarray)
+        Titles and pictures, (H, W, 3) or (H, W), CV_8U. Smaller ones than the largest are placed top left.
+    columns : int, optional
+        How many stand beside each other; by default what makes the whole about as wide as a screen.
+    key : bool
+        Whether to add the meaning of the colours of edges, as `drawEdges` has them.
+
+    Returns
+    -------
+    retval : ndarray of shape (h, w, 3), CV_8U
+
+    Raises
+    ------
+    rangeedge.error
+        If there is no panel, or one is no title with a picture of 8 bits.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rangeedge import drawPanels
+    >>> black = np.zeros((100, 160), np.uint8)
+    >>> drawPanels([("before", black), ("after", black)], 2).shape
+    (132, 328, 3)
+    """
+    pictures = []
+    for panel in panels if isinstance(panels, (list, tuple)) else ():
+        if not isinstance(panel, tuple) or len(panel) != 2 or not isinstance(panel[0], str):
+            raise _check.fail("panels", "a sequence of (title, picture)", _check.described(panel))
+        title, picture = panel
+        if not isinstance(picture, np.ndarray) or picture.dtype != np.uint8 or picture.shape[2:] not in ((), (3,)):
+            raise _check.fail("panels", "pictures (H, W) or (H, W, 3), CV_8U", _check.described(picture))
+        pictures.append((title, cv2.cvtColor(picture, cv2.COLOR_GRAY2BGR) if picture.ndim == 2 else picture))
+    if not pictures:
+        raise _check.fail("panels", "a sequence of (title, picture), one at least", _check.described(panels))
+    height, width = (max(picture.shape[axis] for _, picture in pictures) for axis in (0, 1))
+    full = []
+    for title, picture in pictures:
+        sheet = np.full((height, width, 3), _BACKGROUND, np.uint8)
+        sheet[: picture.shape[0], : picture.shape[1]] = picture
+        full.append((title, sheet))
+    return _sheet(full, None, None if columns is None else _check.integer("columns", columns, 1), key=key)
 
 
 def region_overview(
@@ -181,20 +241,22 @@ def _distance_panel(distance: np.ndarray, valid: np.ndarray) -> tuple[str, np.nd
     return caption, np.where(valid[..., np.newaxis], colours, hatch(valid.shape))
 
 
-def _sheet(panels: list[tuple[str, np.ndarray]], title: str | None) -> np.ndarray:
+def _sheet(
+    panels: list[tuple[str, np.ndarray]], title: str | None, columns: int | None = None, *, key: bool = True
+) -> np.ndarray:
     """Captioned panels in a grid near 16:9, a title above and the key to the colours below."""
     height, width = panels[0][1].shape[:2]
     width = max(width, *(_text_width(caption) for caption, _ in panels))
     cells = [_cell(caption, picture, width) for caption, picture in panels]
     height, width = cells[0].shape[:2]
-    columns = min(
+    columns = columns or min(
         (1, 2, 4) if len(cells) == 4 else (1, 2, 3, 6),
         key=lambda n: abs(np.log(n * width / (-(-len(cells) // n) * height) * 9 / 16)),
     )
     cells += [np.full_like(cells[0], _BACKGROUND)] * (-len(cells) % columns)
     rows = [np.hstack(cells[i : i + columns]) for i in range(0, len(cells), columns)]
     top = [] if title is None else [_bar(title, rows[0].shape[1])]
-    return np.vstack([*top, *rows, _key(rows[0].shape[1])])
+    return np.vstack([*top, *rows, *([_key(rows[0].shape[1])] if key else [])])
 
 
 def _cell(caption: str, picture: np.ndarray, width: int) -> np.ndarray:

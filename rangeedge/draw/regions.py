@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from .. import _check
+from .._option import takes
+from ..options import GEOMETRY
 from .relief import backdrop, nearest
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .._typed import GeometryOptions
 
 _REGIONS = np.array(  # Tol's muted scheme
     [
@@ -18,19 +26,17 @@ _REGIONS = np.array(  # Tol's muted scheme
 )  # fmt: skip
 
 
-@_check.public
+@takes(GEOMETRY)
 def drawRegions(
     labels: np.ndarray,
     src: np.ndarray | None = None,
     alpha: float = 0.6,
     dst: np.ndarray | None = None,
-    *,
-    K: np.ndarray | None = None,
-    heightMap: bool = False,
+    **geometry: Unpack[GeometryOptions],
 ) -> np.ndarray:
     """Draw every region in a colour of its own among its neighbours.
 
-    drawRegions(labels[, src[, alpha[, dst]]], *[, K[, heightMap]]) -> dst
+    drawRegions(labels[, src[, alpha[, dst]]], *[, K[, ...]]) -> dst
 
     Nine colours are shared out so that regions next to each other, or across a gap without label, differ.
 
@@ -44,8 +50,7 @@ def drawRegions(
         Opacity of the regions over `src`, in [0, 1]. Without `src` they are opaque.
     dst : ndarray of shape (H, W, 3), CV_8U, optional
         Receives the result where shape and type fit.
-    K, heightMap
-        As for :func:`drawEdges`.
+    {options}
 
     Returns
     -------
@@ -71,7 +76,7 @@ def drawRegions(
     if src is None:
         canvas, alpha = np.zeros((*labels.shape, 3), np.uint8), 1.0
     else:
-        canvas = backdrop(src, K, heightMap, labels.shape)
+        canvas = backdrop(src, geometry, labels.shape)
     inside = labels > 0
     if inside.any():
         colours = _region_colours(labels, inside)

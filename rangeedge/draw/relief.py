@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import cv2
 import numpy as np
 
 from .. import _check
+from .._option import parsed
 from ..frame import read_frame
 from ..options import ScanLineParams
 
+if TYPE_CHECKING:
+    from .._typed import GeometryOptions
 
-def backdrop(
-    src: np.ndarray, K: np.ndarray | None, heightMap: bool, shape: tuple[int, int] | None = None
-) -> np.ndarray:
+
+def backdrop(src: np.ndarray, geometry: GeometryOptions, shape: tuple[int, int] | None = None) -> np.ndarray:
     """A new picture to draw on: the one given, or the subdued relief of a range image."""
+    (params,) = parsed(geometry, ScanLineParams)
     if isinstance(src, np.ndarray) and src.dtype == np.uint8 and src.ndim == 3 and src.shape[2] == 3 and src.size:
         picture = src.copy()
     else:
-        picture = subdued(relief_of(read_frame(src, ScanLineParams(K=K, heightMap=heightMap)).depth))
+        picture = subdued(relief_of(read_frame(src, params).depth))
     if shape is not None and picture.shape[:2] != shape:
         raise _check.fail("src", f"of shape {shape}", _check.described(src), cv2.Error.StsUnmatchedSizes)
     return picture
