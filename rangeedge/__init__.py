@@ -46,9 +46,18 @@ from .distance import (
     salienceDistanceTransform,
     salienceDistanceTransformWithLabels,
 )
-from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
-from .draw_lines import drawChains, drawSegments
+from .draw import (
+    colorizeDistance,
+    drawChains,
+    drawEdges,
+    drawExplanation,
+    drawOverview,
+    drawPanels,
+    drawRegions,
+    drawSegments,
+)
 from .edges import EdgeStrength, edgePoints, edgeStrength, kindNames, splitScanLine
+from .explain import Explanation, explainPixel
 from .flying import flyingPixels
 from .frames import mapFrames
 from .io import RangeImage, imreadRange, imwriteRange
@@ -99,6 +108,8 @@ __all__ = [  # noqa: RUF022
     "thinEdges",
     "detectEdges",
     "detectEdgesWithStrength",
+    "Explanation",
+    "explainPixel",
     "ScanLineDetector",
     "createScanLineDetector",
     "mapFrames",
@@ -127,6 +138,8 @@ __all__ = [  # noqa: RUF022
     "drawRegions",
     "colorizeDistance",
     "drawOverview",
+    "drawPanels",
+    "drawExplanation",
     "DIR_ROWS",
     "DIR_COLS",
     "DIR_DIAG45",

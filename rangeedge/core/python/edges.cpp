@@ -6,6 +6,7 @@
 #include "edges/select.hpp"
 #include "edges/thin.hpp"
 #include "image/pixels.hpp"
+#include "python/candidates.hpp"
 #include "python/frame.hpp"
 #include "scanline/split.hpp"
 
@@ -29,28 +30,6 @@ auto split_scan_line(const Values<T>& y, const Values<T>& x, double eps) {
 
 std::vector<Candidate> candidates_of(const BoundFrame& bound, const ScanLineOptions& options, int threads) {
     return std::visit([&](const auto& frame) { return find_candidates(frame, options, threads); }, bound.frame);
-}
-
-using Columns = nb::typed<nb::dict, nb::str, nb::any>;
-
-// One array a field, by the field's name.
-Columns columns(const std::vector<Candidate>& candidates) {
-    nb::dict result;
-    const auto add = [&](const char* name, auto member) {
-        using E = std::decay_t<decltype(candidates[0].*member)>;
-        std::vector<E> values;
-        values.reserve(candidates.size());
-        for (const Candidate& c : candidates) values.push_back(c.*member);
-        result[name] = handed_over<E>(std::move(values));
-    };
-    add("x", &Candidate::x);
-    add("y", &Candidate::y);
-    add("jump", &Candidate::jump);
-    add("crease", &Candidate::crease);
-    add("kind", &Candidate::kind);
-    add("significance", &Candidate::significance);
-    add("direction", &Candidate::direction);
-    return result;
 }
 
 Columns edge_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads) {

@@ -7,6 +7,7 @@ namespace rangeedge::python {
 void bind_cancellation(nanobind::module_& m);
 void bind_image(nanobind::module_& m);
 void bind_edges(nanobind::module_& m);
+void bind_explain(nanobind::module_& m);
 void bind_chains(nanobind::module_& m);
 void bind_distance(nanobind::module_& m);
 void bind_regions(nanobind::module_& m);
@@ -20,6 +21,7 @@ NB_MODULE(_core, m) {
     rangeedge::python::bind_cancellation(m);
     rangeedge::python::bind_image(m);
     rangeedge::python::bind_edges(m);
+    rangeedge::python::bind_explain(m);
     rangeedge::python::bind_chains(m);
     rangeedge::python::bind_distance(m);
     rangeedge::python::bind_regions(m);
