@@ -110,6 +110,20 @@ class ClosingOptions(TypedDict, total=False):
     minArea: int
 
 
+class CleaningOptions(TypedDict, total=False):
+    K: ArrayLike | str | os.PathLike[str] | None
+    distCoeffs: ArrayLike | None
+    pixelSize: float | Sequence[float] | None
+    heightMap: bool
+    depthFactor: float
+    invalid: float | Sequence[float | Sequence[float]] | None
+    origin: Sequence[float] | None
+    noise: NoiseModel | float | np.ndarray | None
+    maxHole: int
+    radius: float
+    removeFlying: bool
+
+
 class JoiningOptions(TypedDict, total=False):
     bridge: float
     cornerAngle: float

@@ -489,6 +489,37 @@ class Closing(Options):
 
 @declared
 @dataclass(frozen=True, eq=False, repr=False)
+class Cleaning(Options):
+    """What is done to depths."""
+
+    maxHole: int = option(
+        24,
+        _whole(0),
+        "int",
+        "Widest hole to fill: where a disc of this diameter without data fits in, the hole stays; 0 fills none.",
+        unit="pixels",
+        group="cleaning",
+    )
+    radius: float = option(
+        6.0,
+        _real(0, 100),
+        "float",
+        "Standard deviation of the weights with which noise is averaged over a surface, from 0, which leaves it, to"
+        " 100.",
+        unit="pixels",
+        group="cleaning",
+    )
+    removeFlying: bool = option(
+        True,
+        _check.boolean,
+        "bool",
+        "Whether to remove flying pixels (`flyingPixels`), which are holes then.",
+        group="cleaning",
+    )
+
+
+@declared
+@dataclass(frozen=True, eq=False, repr=False)
 class Linking(Options):
     """How edge points are joined into chains."""
 
@@ -525,4 +556,5 @@ SEEDING = Seeding.options
 GROWING = {**MEASURED, **_of(Growing, "regions")}
 SEGMENTING = {**MEASURED, **Growing.options}
 LINKING = {**DETECTION, **Linking.options}
+CLEANING = {**MEASURED, **Cleaning.options}
 CLOSING = {**MEASURED, **Closing.options}

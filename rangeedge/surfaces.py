@@ -23,14 +23,19 @@ _PLACE = {e: n for n, e in enumerate(_EXPONENTS)}
 
 def surface_map(frame: Frame, edges: np.ndarray | None) -> _core.RangeMap:
     """What the kernels on surfaces take: places on the image plane, ordinates and their noise, edges."""
-    x, y, to_plane = _places(frame)
+    x, y, to_plane = places(frame)
+    relative, offset, rounding = relative_ordinate(frame)
+    return _core.RangeMap(frame.kernel, x, y, relative, offset, rounding, to_plane, edges)
+
+
+def relative_ordinate(frame: Frame) -> tuple[np.ndarray, float, float]:
+    """Ordinates of which planes are affine functions, less an offset, in single precision; the offset, its rounding."""
     ordinate = _along_axis(frame)
     seen = ordinate[np.isfinite(ordinate)]
     offset = float(seen[:: max(1, len(seen) // 4096)].mean(dtype=np.float64)) if len(seen) else 0.0
     with np.errstate(invalid="ignore", over="ignore"):  # signalling NaN; beyond single precision
         relative = (ordinate - ordinate.dtype.type(offset)).astype(np.float32, copy=False)
-    rounding = float(np.spacing(np.abs(ordinate.dtype.type(offset))))
-    return _core.RangeMap(frame.kernel, x, y, relative, offset, rounding, to_plane, edges)
+    return relative, offset, float(np.spacing(np.abs(ordinate.dtype.type(offset))))
 
 
 def _along_axis(frame: Frame) -> np.ndarray:
@@ -40,7 +45,7 @@ def _along_axis(frame: Frame) -> np.ndarray:
     return replace(frame, ranges=False).ordinate
 
 
-def _places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[float, ...]]:
+def places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[float, ...]]:
     """Where pixels lie on the image plane, in units of about a pixel, and how that becomes coordinates.
 
     None for a regular grid: columns and rows.

@@ -115,7 +115,7 @@ def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None)
         data = stream.read(size)
         found = read_abw(data, calibration or abw_calibration(name)) if abw else read(data)
         image = found if isinstance(found, RangeImage) else RangeImage(found)
-        image = image._replace(src=_range_image(image.src))
+        image = image._replace(src=as_range_image(image.src))
         if image.geometry:
             checked(image.src[:1, :1], ScanLineParams(**image.geometry))  # whether they fit
         return image
@@ -206,7 +206,7 @@ def imwriteRange(
     return True
 
 
-def _range_image(array: np.ndarray) -> np.ndarray:
+def as_range_image(array: np.ndarray) -> np.ndarray:
     """What a file holds as a range image of our own; a third axis of length 1 is dropped."""
     if array.ndim == 3 and array.shape[2] == 1:
         array = array[..., 0]

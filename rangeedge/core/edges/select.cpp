@@ -6,6 +6,7 @@
 #include <numeric>
 #include <vector>
 
+#include "base/watch.hpp"
 #include "image/components.hpp"
 
 namespace rangeedge {
@@ -31,7 +32,9 @@ void keep_lines(const std::uint8_t* edges, int rows, int cols, bool wrap, int mi
             image[(row + 1) * stride + col + 1] = edges[row * width + col] != 0;
     std::fill_n(kept, static_cast<std::size_t>(rows) * width, std::uint8_t{0});
     const Components parts(image.data(), rows, cols, 8, wrap);
+    Checkpoints checkpoints;
     for (int i = 0; i < parts.count(); ++i) {
+        checkpoints.pass();
         int left = cols, right = -1, top = rows, bottom = -1;
         double squares = 0, pixels = 0;
         for (const auto [begin, end] : parts.runs(i)) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/disjoint_sets.hpp"
+#include "base/watch.hpp"
 
 namespace rangeedge {
 
@@ -38,6 +39,7 @@ public:
         DisjointSets sets;      // of runs; the first in raster order represents each
         std::size_t above = 0;  // first run that may touch the next one from the row above
         for (int row = 0; row < rows; ++row) {
+            Watch::checkpoint();
             const std::size_t row_begin = found.size();
             int p = (row + 1) * stride + 1;
             for (const int end = p + cols; (p = find_value(image, p, end)) < end;) {
@@ -109,7 +111,9 @@ private:
 
     void sort(const std::vector<Run>& found, DisjointSets& sets) {
         std::vector<std::size_t> sizes, component(found.size());
+        Checkpoints checkpoints;
         for (std::size_t i = 0; i < found.size(); ++i) {
+            checkpoints.pass();
             const auto root = static_cast<std::size_t>(sets.find(static_cast<int>(i)));
             if (root == i) {
                 component[i] = areas_.size();

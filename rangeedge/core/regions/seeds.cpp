@@ -90,9 +90,11 @@ public:
     std::vector<Pass> passes(const Array<int>& summit) const;
     template <class F>
     void for_pixels(int first, int last, F&& visit) const {
-        for (int row = first; row < last; ++row)
+        for (int row = first; row < last; ++row) {
+            Watch::checkpoint();
             for (int p = index(row, 0), end = p + cols_; p < end; ++p)
                 if (level_[p] > 0) visit(p);
+        }
     }
     int rows() const { return rows_; }
 
@@ -171,7 +173,9 @@ std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
     });
     std::vector<Pass> all;
     for (const auto& passes : found) all.insert(all.end(), passes.begin(), passes.end());
-    std::sort(all.begin(), all.end(), [](const Pass& m, const Pass& n) {
+    Checkpoints checkpoints;
+    std::sort(all.begin(), all.end(), [&](const Pass& m, const Pass& n) {
+        checkpoints.pass();
         return m.level != n.level ? m.level > n.level : std::make_pair(m.a, m.b) < std::make_pair(n.a, n.b);
     });
     return all;
@@ -190,7 +194,9 @@ std::vector<int> peaks(const DistanceImage& image, const Array<int>& summit, flo
     };
     const auto at = [&](int i) { return summits[static_cast<std::size_t>(i)]; };
     std::vector<int> found;
+    Checkpoints checkpoints;
     for (const Pass& pass : image.passes(summit)) {
+        checkpoints.pass();
         int low = islands.find(number(pass.a)), high = islands.find(number(pass.b));
         if (low == high) continue;
         if (image.higher(at(low), at(high))) std::swap(low, high);
@@ -212,6 +218,7 @@ int extract_seeds(const float* distance, const std::uint8_t* mask, int height, i
     Array<int> seed(image.size(), 0);
     std::vector<int> stack;
     int seeds = 0;
+    Checkpoints checkpoints;
     for (const int peak : peaks(image, image.basins(), separation)) {
         if (image[peak] < min_distance) continue;
         // Where all is infinitely far, or `separation` vanishes in single precision, nothing but no pixel is too low.
@@ -220,6 +227,7 @@ int extract_seeds(const float* distance, const std::uint8_t* mask, int height, i
         seed[peak] = ++seeds;
         stack.assign(1, peak);
         while (!stack.empty()) {
+            checkpoints.pass();
             const int p = stack.back();
             stack.pop_back();
             for (const int step : image.neighbours()) {
