@@ -9,9 +9,11 @@ import numpy as np
 from . import _core
 from ._check import deliver, image8
 from ._option import parsed, takes
+from .frame import Frame
 from .noise import measured_frame
 from .options import CLOSING, Closing, Growing, ScanLineParams
 from .regions import seeded_regions
+from .sectors import sectors_of
 from .surfaces import surface_map
 
 if TYPE_CHECKING:
@@ -89,6 +91,16 @@ def closeContours(
     params, closing = parsed(options, ScanLineParams, Closing)
     frame = measured_frame(src, params, mask)
     edges = image8("edges", edges, frame.shape)
+    return deliver("dst", _closed(frame, edges, closing), dst)
+
+
+def _closed(frame: Frame, edges: np.ndarray, closing: Closing) -> np.ndarray:
+    parts = sectors_of(frame)
+    if parts:
+        whole = np.empty(frame.shape, np.uint8)
+        for part in parts:
+            part.put(whole, _closed(part.frame, part.take(edges), closing))
+        return whole
     regions = seeded_regions(frame, edges, Growing(minArea=closing.minArea, smoothAngle=_SMOOTH_ANGLE))[1]
     kernel_options = _core.ClosureOptions(
         correlation=frame.correlation,
@@ -99,5 +111,4 @@ def closeContours(
     )
     lines = np.empty(frame.shape, np.uint8)
     _core.close_contours(surface_map(frame, edges), regions, kernel_options, frame.threads, lines)
-    closed = ((edges != 0) | (lines != 0)).view(np.uint8) * np.uint8(255)
-    return deliver("dst", closed, dst)
+    return ((edges != 0) | (lines != 0)).view(np.uint8) * np.uint8(255)

@@ -233,8 +233,7 @@ def _groups(segments: np.ndarray, reach: float) -> list[list[tuple[int, int]]]:
     if not ends:
         return []
     pixels, places = segments["pixels"].reshape(-1, 2), segments["ends"].reshape(-1, 3)
-    spans = np.linalg.norm(segments["pixels"][:, 1] - segments["pixels"][:, 0], axis=1)
-    per_pixel = np.repeat(segments["length"] / np.maximum(spans, 1), 2)  # length that a pixel covers
+    per_pixel = np.repeat(_per_pixel(segments), 2)
     group = np.arange(len(ends))
     order = np.argsort(pixels[:, 0], kind="stable")
     columns = pixels[order, 0]
@@ -267,10 +266,19 @@ def _vertex(
             ends = np.array([segments["pixels"][end] for end in group])
             if place is None or (np.linalg.norm(ends - place, axis=1) > 2 * reach).any():
                 return None  # lines that are nearly one meet anywhere
+            ends = np.array([segments["ends"][end] for end in group])
+            if (np.linalg.norm(ends - point, axis=1) > 2 * reach * _per_pixel(lines).max()).any():
+                return None  # and what is straight in space is so in the image of a camera only
             x, y = place
             return (point, x, y, float(np.sqrt(np.mean(off**2))), len(group)), group
         group = group[:worst] + group[worst + 1 :]
     return None
+
+
+def _per_pixel(lines: np.ndarray) -> np.ndarray:
+    """The length that a pixel covers."""
+    spans = np.linalg.norm(lines["pixels"][:, 1] - lines["pixels"][:, 0], axis=1)
+    return lines["length"] / np.maximum(spans, 1)
 
 
 def _image_directions(lines: np.ndarray) -> np.ndarray:

@@ -287,12 +287,18 @@ private:
         return frame_.projective ? 1 / along : -along;
     }
 
+    // The share of a length on the line of sight that lies along the axis, where jumps are measured on that.
+    double along_axis(std::int32_t pixel) const {
+        if (!frame_.ranges) return 1;
+        return 1 / (std::abs(ordinate_at(pixel)) * length(frame_.point(pixel)));
+    }
+
     // Of a surface beside an edge, moved along the scan line to where the candidate was moved.
     double ordinate(const Sample& s, int side) const {
         const Candidate& c = *s.candidate;
         if (!has_sides(c)) {
             const double near = ordinate_at(c.kind & occluding_bit ? c.before : c.after),
-                         jump = static_cast<double>(c.jump);
+                         jump = static_cast<double>(c.jump) * along_axis(c.before);
             if (side == 0) return near;
             return frame_.projective ? 1 / (1 / near + jump) : near - jump;
         }

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <map>
 
+#include "base/watch.hpp"
+
 namespace rangeedge {
 namespace {
 
@@ -41,7 +43,8 @@ void OpenParts::number() {
     const Array<int> before = part_;
     std::fill(part_.begin(), part_.end(), 0);
     pixels_.assign(1, {});
-    for (int row = 0; row < image_.rows(); ++row)
+    for (int row = 0; row < image_.rows(); ++row) {
+        Watch::checkpoint();
         for (int first = image_.index(row, 0), end = first + image_.cols(), start = first; start < end; ++start) {
             if (!before[start] || part_[start]) continue;
             pixels_.emplace_back(1, start);
@@ -55,6 +58,7 @@ void OpenParts::number() {
                     part_[q] = number, pixels.push_back(q);
                 }
         }
+    }
     count_ = static_cast<int>(pixels_.size()) - 1;
 }
 
@@ -142,7 +146,8 @@ void OpenParts::trim_spurs() {
 
 std::vector<Border> OpenParts::borders() const {
     std::map<std::pair<int, int>, Pixels> found;
-    for (int row = 0; row < image_.rows(); ++row)
+    for (int row = 0; row < image_.rows(); ++row) {
+        Watch::checkpoint();
         for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; ++p)
             for (const int step : image_.neighbours()) {
                 const int a = part_[p], b = part_[p + step];
@@ -150,6 +155,7 @@ std::vector<Border> OpenParts::borders() const {
                 Pixels& pixels = found[{std::min(a, b), std::max(a, b)}];
                 if (pixels.empty() || pixels.back() != p) pixels.push_back(p);
             }
+    }
     std::vector<Border> result;
     for (auto& [pair, pixels] : found) result.push_back({pair.first, pair.second, std::move(pixels)});
     return result;
