@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._check import error
 from .adjacency import regionAdjacency
+from .boundaries import RegionBoundaries, RegionBoundary, regionBoundaries
 from .chains import EdgeChain, EdgeChains, linkEdges
 from .cleaning import cleanDepth
 from .closure import closeContours
@@ -46,6 +47,7 @@ from .distance import (
     salienceDistanceTransformWithLabels,
 )
 from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
+from .draw_boundaries import drawBoundaries
 from .draw_lines import drawChains, drawSegments
 from .edges import EdgeStrength, edgePoints, edgeStrength, kindNames, splitScanLine
 from .flying import flyingPixels
@@ -115,12 +117,16 @@ __all__ = [  # noqa: RUF022
     "growRegionsWithStats",
     "segmentRegions",
     "segmentRegionsWithStats",
+    "RegionBoundary",
+    "RegionBoundaries",
+    "regionBoundaries",
     "regionAdjacency",
     "cleanDepth",
     "drawEdges",
     "drawChains",
     "drawSegments",
     "drawRegions",
+    "drawBoundaries",
     "colorizeDistance",
     "drawOverview",
     "DIR_ROWS",
