@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ._check import error
 from .adjacency import regionAdjacency
 from .boundaries import RegionBoundaries, RegionBoundary, regionBoundaries
+from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
 from .cleaning import cleanDepth
 from .closure import closeContours
@@ -46,11 +47,21 @@ from .distance import (
     salienceDistanceTransform,
     salienceDistanceTransformWithLabels,
 )
-from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
-from .draw_boundaries import drawBoundaries
-from .draw_lines import drawChains, drawSegments
+from .draw import (
+    colorizeDistance,
+    drawBoundaries,
+    drawChains,
+    drawEdges,
+    drawExplanation,
+    drawOverview,
+    drawPanels,
+    drawRegions,
+    drawSegments,
+)
 from .edges import EdgeStrength, edgePoints, edgeStrength, kindNames, splitScanLine
+from .explain import Explanation, explainPixel
 from .flying import flyingPixels
+from .frames import mapFrames
 from .io import RangeImage, imreadRange, imwriteRange
 from .io.lines import writeLines
 from .noise import estimateNoise
@@ -77,6 +88,7 @@ __version__ = "0.1.0"
 __all__ = [  # noqa: RUF022
     "error",
     "RangeEdgeWarning",
+    "Cancellation",
     "RangeImage",
     "imreadRange",
     "imwriteRange",
@@ -98,8 +110,11 @@ __all__ = [  # noqa: RUF022
     "thinEdges",
     "detectEdges",
     "detectEdgesWithStrength",
+    "Explanation",
+    "explainPixel",
     "ScanLineDetector",
     "createScanLineDetector",
+    "mapFrames",
     "EdgeChain",
     "EdgeChains",
     "linkEdges",
@@ -129,6 +144,8 @@ __all__ = [  # noqa: RUF022
     "drawBoundaries",
     "colorizeDistance",
     "drawOverview",
+    "drawPanels",
+    "drawExplanation",
     "DIR_ROWS",
     "DIR_COLS",
     "DIR_DIAG45",

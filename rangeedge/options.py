@@ -121,6 +121,7 @@ class ScanLineParams(Options):
             camera = _check.camera_file("K", self.K)
             object.__setattr__(self, "K", camera.K)
             object.__setattr__(self, "distCoeffs", camera.distCoeffs)
+            object.__setattr__(self, "imageSize", self.imageSize or camera.size)
         super().__post_init__()
 
     eps: float | None = option(
@@ -144,7 +145,7 @@ class ScanLineParams(Options):
         "array_like or path or None",
         "Camera; the values of `src` are then depths along the optical axis. (fx, fy, cx, cy), 3x3, 3x4, 9 numbers by"
         " rows, or the name of a file of one (YAML, JSON or XML of cv2, ROS, Open3D or librealsense, text, NPY, NPZ),"
-        " whose distortion replaces `distCoeffs`.",
+        " whose distortion replaces `distCoeffs`, and whose image size `src` must have.",
         group="geometry",
         kept="np.ndarray | None",
         read=_parse.camera,
@@ -161,6 +162,18 @@ class ScanLineParams(Options):
         read=_parse.distortion,
         metavar="K1,K2,P1,P2[,...]",
         flagged="distortion of the lens, with -K, as cv2 has it (default: none, or that of the camera's file)",
+    )
+    imageSize: Sequence[int] | None = option(
+        None,
+        _or_none(_check.image_size),
+        "(int, int) or None",
+        "Width and height of the images that `K` holds for: others, resized or cropped, are refused. None: that of the"
+        " camera's file, where it tells one.",
+        group="geometry",
+        kept="tuple[int, int] | None",
+        read=_parse.image_size,
+        metavar="W,H",
+        flagged="size of the images that -K holds for, others are refused (default: that of the camera's file)",
     )
     pixelSize: float | Sequence[float] | None = option(
         None,

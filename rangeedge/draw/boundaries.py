@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
-from . import _check
-from .boundaries import RegionBoundaries
-from .draw import REGION_COLOURS, shared_out
-from .draw_lines import canvas_of, fixed
+from .. import _check
+from .._option import takes
+from ..boundaries import RegionBoundaries
+from ..options import GEOMETRY
+from .lines import canvas_of, fixed
+from .regions import REGION_COLOURS, shared_out
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .._typed import GeometryOptions
 
 _SHIFT = 4  # binary digits of fractions of a pixel, as `fixed` has them
 _LINE = (255, 255, 255)
@@ -18,7 +26,7 @@ _HALO = (32, 32, 32)
 _MEETING = 3  # regions at a corner that is drawn
 
 
-@_check.public
+@takes(GEOMETRY)
 def drawBoundaries(
     src: np.ndarray,
     boundaries: RegionBoundaries,
@@ -26,12 +34,11 @@ def drawBoundaries(
     dst: np.ndarray | None = None,
     *,
     scale: int = 1,
-    K: np.ndarray | None = None,
-    heightMap: bool = False,
+    **geometry: Unpack[GeometryOptions],
 ) -> np.ndarray:
     """Draw outlines of regions over the shaded relief of a range image, or over a picture.
 
-    drawBoundaries(src, boundaries[, alpha[, dst]], *[, scale[, K[, heightMap]]]) -> dst
+    drawBoundaries(src, boundaries[, alpha[, dst]], *[, scale[, K[, ...]]]) -> dst
 
     Regions are filled with the colours of `drawRegions`, their borders are white lines, and corners in which three of
     them meet are white dots.
@@ -48,8 +55,7 @@ def drawBoundaries(
         Receives the result where shape and type fit.
     scale : int
         Pixels of the picture to one of the image, from 1 to 16.
-    K, heightMap
-        Geometry of a range image, as for :func:`drawEdges`.
+    {options}
 
     Returns
     -------
@@ -72,7 +78,7 @@ def drawBoundaries(
     if not isinstance(boundaries, RegionBoundaries):
         raise _check.fail("boundaries", "RegionBoundaries", _check.described(boundaries))
     alpha = _check.number("alpha", alpha, 0, 1)
-    canvas, scale = canvas_of(src, scale, K, heightMap)
+    canvas, scale = canvas_of(src, scale, geometry)
     if alpha > 0:
         filled = canvas.copy()
         colours = _colours(boundaries.arcs)
