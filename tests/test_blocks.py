@@ -159,7 +159,9 @@ class TestRuns:
         assert (distanceTransform(edges)[found["edges"][:] > 0] <= 1.5).mean() > 0.98
         both = (found["crease"][:] > 15) & (strength.crease > 15)
         assert np.count_nonzero(both) > 200
-        assert np.median(np.abs(found["crease"][:] - strength.crease)[both]) < 0.01
+        difference = np.abs(found["crease"][:] - strength.crease)
+        assert np.percentile(difference[:, :160][both[:, :160]], 90) < 0.1
+        assert np.percentile(difference[:, 160:][both[:, 160:]], 90) < 0.1
 
     def test_processes_and_resuming_change_nothing(self, zarr, tmp_path):
         np.save(tmp_path / "a.npy", terrain())
