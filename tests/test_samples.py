@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 import pytest
 
-from rangeedge import imreadRange, imwriteRange
+from rangeedge import detectEdges, imreadRange, imwriteRange
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
 
 SAMPLES = Path(__file__).resolve().parents[1] / "samples"
@@ -22,6 +22,7 @@ PICTURES = {
     "segmentation": ["segmentation.png"],
     "pipeline": ["candidates.png"],
     "box_dimensions": ["box_dimensions.png"],
+    "live": ["live.png"],
 }
 
 
@@ -29,7 +30,7 @@ PICTURES = {
 def from_samples(monkeypatch):
     monkeypatch.syspath_prepend(SAMPLES)
     yield
-    for name in ("calibration", "common", "figure6", "scores", *PICTURES):
+    for name in ("calibration", "common", "figure6", "ros2_node", "scores", *PICTURES):
         sys.modules.pop(name, None)
 
 
@@ -51,7 +52,10 @@ def image(tmp_path):
 
 
 def test_every_sample_is_tested():
-    assert {path.stem for path in SAMPLES.glob("*.py")} == {"calibration", "common", "figure6", "scores", *PICTURES}
+    assert {path.stem for path in SAMPLES.glob("*.py")} == {
+        *("calibration", "common", "figure6", "ros2_node", "scores"),
+        *PICTURES,
+    }
 
 
 @pytest.mark.parametrize("name", PICTURES)
@@ -156,6 +160,32 @@ def test_figure6_refuses_bad_options(argv, capsys):
         run("figure6", "--frequency", "3", "--pairs", "1", *argv)
     assert exit_.value.code == 2
     assert "usage" in capsys.readouterr().err
+
+
+def test_live_shows_every_frame_of_a_recording(tmp_path, capsys):
+    depth = np.full((3, 60, 80), 1500, np.uint16)
+    depth[:, 20:40, 30:50] = 1000
+    np.savez(tmp_path / "walk.npz", depth=depth, K=np.array([[80.0, 0, 39.5], [0, 80, 29.5], [0, 0, 1]]))
+    run("live", tmp_path / "walk.npz", "--out", tmp_path)
+    said = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in said[:3]] == ["frame 0", "frame 1", "frame 2"]
+    assert all("2 regions" in line for line in said[:3])
+
+
+def test_the_node_publishes_the_edges_of_a_bag(tmp_path, capsys):
+    pytest.importorskip("rosbags")
+    from rosbags.highlevel import AnyReader
+
+    run("ros2_node", "--out", tmp_path)
+    assert "edges of 3 images" in capsys.readouterr().out
+    src, geometry = importlib.import_module("common").built_in_scene()
+    edges = detectEdges(src, **geometry)
+    with AnyReader([tmp_path / "edges"]) as reader:
+        messages = [reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()]
+    assert [message.header.stamp.sec for message in messages] == [0, 1, 2]
+    for message in messages:
+        assert message.encoding == "mono8"
+        assert np.array_equal(message.data.reshape(message.height, message.width), edges)
 
 
 def test_scores_prefer_rangeedge(capsys):
