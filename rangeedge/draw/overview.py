@@ -269,6 +269,7 @@ def _cell(caption: str, picture: np.ndarray, width: int) -> np.ndarray:
 
 def _bar(text: str, width: int) -> np.ndarray:
     bar = np.full((_BAR, width, 3), _BACKGROUND, np.uint8)
+    text = text.encode("utf-8", "replace").decode()  # names of files may hold what OpenCV 5 does not survive
     return cv2.putText(bar, text, (6, _BAR - 9), _FONT, _FONT_SCALE, _INK, 1, cv2.LINE_AA)
 
 

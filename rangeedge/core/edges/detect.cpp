@@ -248,11 +248,18 @@ std::vector<Part> parts_of(int directions, int rows, int cols) {
 // Leaves no candidates on smeared pixels. Every direction has a chance to find these.
 void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, std::uint8_t* smeared) {
     std::vector<std::int32_t> pixels;
-    for (const Part& part : parts) pixels.insert(pixels.end(), part.found.smeared.begin(), part.found.smeared.end());
+    Checkpoints checkpoints(64);
+    for (const Part& part : parts) {
+        checkpoints.pass();
+        pixels.insert(pixels.end(), part.found.smeared.begin(), part.found.smeared.end());
+    }
     int count = 0;
     for (const int direction : all_directions) count += (directions & direction) != 0;
     const SmearMask mask(rows, cols, pixels, count);
-    for (Part& part : parts) mask.clear_of_candidates(part.found.candidates);
+    for (Part& part : parts) {
+        checkpoints.pass();
+        mask.clear_of_candidates(part.found.candidates);
+    }
     if (smeared) mask.write(smeared);
 }
 
@@ -271,6 +278,7 @@ std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOpti
         Approximator<T> approximator(options);
         Found found;
         for (std::size_t i; (i = taken++) < parts.size();) {
+            Watch::checkpoint();
             Part& part = parts[i];
             const LineDetector<T> detector(frame, options, part.direction);
             detector.read(part.first, part.count, strip);
@@ -286,8 +294,10 @@ std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOpti
     std::vector<Candidate> candidates(static_cast<std::size_t>(order));
     Cells cells(frame.rows, frame.cols);
     for (const Part& part : parts) cells.count(part.found.candidates);
-    for (const Part& part : parts)
+    for (const Part& part : parts) {
+        Watch::checkpoint();
         cells.assign(part.found.candidates, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
+    }
     parts.clear();
     join_neighbours(candidates, frame, options, team, weak);
     return candidates;
@@ -332,8 +342,11 @@ LineTrace trace_line(const Frame<T>& frame, const ScanLineOptions& options, int 
 }
 
 void put_in_order(std::vector<Candidate>& candidates) {
-    std::sort(candidates.begin(), candidates.end(),
-              [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
+    Checkpoints checkpoints;
+    std::sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
+        checkpoints.pass();
+        return a.order < b.order;
+    });
 }
 
 #define RANGEEDGE_INSTANTIATE(T)                                                                                 \

@@ -37,7 +37,12 @@ void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, 
     const auto least = static_cast<float>(options.min_significance);
     const bool aligned = options.max_shift > 0;
     if (!(least > 0 || aligned || options.normals)) return;
+    Checkpoints checkpoints;
     const auto weak = [&](const Candidate& c) { return c.significance < least; };
+    const auto goes = [&](const Candidate& c) {
+        checkpoints.pass();
+        return weak(c);
+    };
     {
         NeighbourGrid grid(candidates, frame.rows, frame.cols, evidence_field + 1);
         grid.for_each([&](std::size_t i, std::size_t k) {
@@ -58,7 +63,7 @@ void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, 
         }
     }
     if (weak_ones) std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(*weak_ones), weak);
-    candidates.erase(std::remove_if(candidates.begin(), candidates.end(), weak), candidates.end());
+    candidates.erase(std::remove_if(candidates.begin(), candidates.end(), goes), candidates.end());
     if (!options.normals) return;
     const NeighbourGrid tangents = tangent_grid(candidates, frame.rows, frame.cols);
     tangents.for_each_near(team, [&](std::size_t i, const NeighbourGrid::Near& near) {
