@@ -61,6 +61,103 @@ def test_every_sample_is_tested():
 def test_runs_on_an_image(name, image, tmp_path, capsys):
     out = tmp_path / "pictures"
     run(name, image, "--out", out)
+    said = capsys.readouterr().out
+    for picture in PICTURES[name]:
+        content = cv2.imread(str(out / picture), cv2.IMREAD_UNCHANGED)
+        assert content.shape[0] >= 150
+        assert content.shape[1] >= 200
+        assert content.max() > 0
+        assert str(out / picture) in said
+
+
+@pytest.mark.parametrize("name", ["edges", "seeds"])
+def test_runs_on_a_grid_without_edges(name, tmp_path):
+    imwriteRange(tmp_path / "flat.npz", np.zeros((60, 80), np.float32), pixelSize=0.5, heightMap=True)
+    run(name, tmp_path / "flat.npz", "--out", tmp_path)
+    assert (tmp_path / PICTURES[name][0]).exists()
+
+
+def test_pipeline_grips_every_object_of_the_scene(tmp_path):
+    run("pipeline", "--out", tmp_path)
+    with open(tmp_path / "candidates.csv", newline="") as file:
+        rows = [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+    assert len(rows) > 10
+    for row in rows:
+        place, normal = (np.array([row[prefix + axis] for axis in "xyz"]) for prefix in ("", "normal_"))
+        assert abs(np.linalg.norm(normal) - 1) < 1e-3
+        assert normal @ place < 0
+        assert row["free"] >= 0.015
+        assert row["unevenness"] <= 0.003
+    # Tops of boxes are parallel to the table, which is seen under 32 degrees.
+    tops = [row for row in rows if abs(row["normal_y"] + np.cos(np.radians(32))) < 0.03]
+    assert len(tops) >= 3
+
+
+def test_the_box_is_measured_within_two_millimetres(tmp_path):
+    sizes = run("box_dimensions", "--out", tmp_path)
+    assert [count for _, _, count in sizes] == [3, 3, 3]
+    assert np.allclose([length for length, _, _ in sizes], (0.20, 0.25, 0.30), atol=0.002)
+
+
+def test_pipeline_needs_a_camera(tmp_path, capsys):
+    imwriteRange(tmp_path / "flat.npy", np.zeros((60, 80), np.float32))
+    with pytest.raises(SystemExit) as end:
+        run("pipeline", tmp_path / "flat.npy", "--out", tmp_path / "out")
+    assert end.value.code == 2
+    assert "pinhole camera" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+def test_pipeline_heeds_the_depth_factor(image, tmp_path):
+    src, geometry = imreadRange(image)
+    imwriteRange(tmp_path / "tenths.npz", 10 * src, K=geometry["K"], depthFactor=10000)
+    run("pipeline", image, "--out", tmp_path / "one")
+    run("pipeline", tmp_path / "tenths.npz", "--out", tmp_path / "other")
+    one, other = ((tmp_path / name / "candidates.csv").read_text() for name in ("one", "other"))
+    assert one == other
+    assert one.count("\n") > 1
+
+
+def test_paper_prints_and_draws(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    run("paper", "--frequency", 4, "--pairs", 3, "--sigma", 0, "--out", tmp_path / "new" / "folder")
+    printed = capsys.readouterr().out
+    assert "CREASE_MAX     theory, all 5151 pairs: |E| 6.08 ± 7.23" in printed
+    assert "CREASE_NORMAL  theory, all 5151 pairs: |E| 0.00 ± 0.00" in printed
+    assert "CREASE_NORMAL  detector, sigma 0, 3 of 3 pairs" in printed
+    for number in (6, 7, 8, 10, 11):
+        assert cv2.imread(str(tmp_path / "new" / "folder" / f"figure{number}.png")).std() > 10
+    quiet = [float(line.split("F ")[1].split(",")[0]) for line in printed.splitlines() if line.startswith("  eps")]
+    assert len(quiet) == 3
+    assert min(quiet) > 0.99
+    off = [float(line.split(": ")[1].split(",")[0]) for line in printed.splitlines() if line.startswith("  adapted")]
+    assert off[0] < 0.5
+
+
+def test_calibration_prints_shares_near_those_of_a_normal_deviate(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    run("calibration", "--out", tmp_path)
+    lines = [line.split() for line in capsys.readouterr().out.splitlines() if " n = " in line]
+    assert len(lines) == 6 * 4 * 2
+    ratios = np.array([[float(word) for word in line[-5:]] for line in lines])
+    slopes = np.array(["slope" in line for line in lines])
+    assert ((ratios[slopes, :2] > 0.5) & (ratios[slopes, :2] < 2)).all()
+    assert (ratios[:, :2] < 2).all()
+    assert cv2.imread(str(tmp_path / "calibration.png")).std() > 10
+
+
+@pytest.mark.parametrize("argv", [["--frequency", "1"], ["--frequency", "x"], ["--sigma", "-1"]])
+def test_paper_refuses_bad_options(argv, capsys):
+    pytest.importorskip("matplotlib")
+    with pytest.raises(SystemExit) as exit_:
+        run("paper", "--frequency", "3", "--pairs", "1", *argv)
+    assert exit_.value.code == 2
+    assert "usage" in capsys.readouterr().err
+
+
+def test_scan_line_has_one_strong_candidate(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    run("scan_line", "--out", tmp_path)
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     (creases,) = [[float(word) for word in line[2:]] for line in lines if line[0] == "crease"]
     assert sorted(creases)[-1] > 30
