@@ -353,3 +353,24 @@ def test_contours_are_closed_all_around():
     assert (closed | ~broken).all()
     assert near(closed & ~broken, borders(faces)) > 0.95
     assert (closed & ~broken).sum() > 0.7 * (whole & ~broken).sum()
+
+
+def test_noise_is_smoothed_all_around():
+    rays, ranges, _ = sweep(64, 22.5, (180, -180))
+    truth = rays * ranges[..., None]
+    points, _ = room(64)
+    cleaned, changed = rangeedge.cleanDepth(points)
+    off = np.linalg.norm(cleaned - truth, axis=2), np.linalg.norm(points - truth, axis=2)
+    assert off[0].max() < 0.05
+    assert np.sqrt((off[0] ** 2).mean()) < 0.7 * np.sqrt((off[1] ** 2).mean())
+    assert (changed == rangeedge.CLEAN_SMOOTHED).mean() > 0.98
+
+
+def test_pixels_at_the_seam_are_explained():
+    points, faces = room(columns=57)
+    edges = detectEdges(points)
+    for x in (0, 1, COLUMNS - 2, COLUMNS - 1):
+        for y in (10, 30, 50):
+            why = rangeedge.explainPixel(points, x, y)
+            assert why.edge == bool(edges[y, x])
+            assert why.stage != "line"
