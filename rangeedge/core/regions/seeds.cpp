@@ -4,6 +4,8 @@
 // it only goes up and down again. So a few summits and passes tell what all the pixels do. Passes are taken in falling
 // order, as water that sinks uncovers them: each joins two islands, and the lower of their peaks counts by itself if
 // the pass is low beside it.
+//
+// Ways uphill are followed in bands of rows, in parallel: within its band first, then from band to band.
 // SPDX-License-Identifier: Apache-2.0
 #include "regions/seeds.hpp"
 
@@ -18,6 +20,7 @@
 #include "base/array.hpp"
 #include "base/disjoint_sets.hpp"
 #include "base/parallel.hpp"
+#include "base/simd.hpp"
 
 namespace rangeedge {
 namespace {
@@ -34,9 +37,16 @@ float value_of(std::int32_t bits) {
     return value;
 }
 
+// Bits of the distances of a row; 0 where there is no pixel.
+RANGEEDGE_WIDE void keep_levels(const float* distance, const std::uint8_t* mask, int n, float lowest,
+                                std::int32_t* level) {
+    for (int k = 0; k < n; ++k) level[k] = distance[k] > 0 && !(distance[k] < lowest) ? bits_of(distance[k]) : 0;
+    for (int k = 0; mask && k < n; ++k) level[k] = mask[k] ? level[k] : 0;
+}
+
 // Where a row of neighbours is higher than what was found so far, they and the step to them take its place.
-void keep_highest(const std::int32_t* __restrict beside, std::int32_t step, int n, std::int32_t* __restrict highest,
-                  std::int32_t* __restrict to) {
+RANGEEDGE_WIDE void keep_highest(const std::int32_t* __restrict beside, std::int32_t step, int n,
+                                 std::int32_t* __restrict highest, std::int32_t* __restrict to) {
     for (int k = 0; k < n; ++k) {
         const std::int32_t better = -(beside[k] > highest[k]);
         highest[k] = (beside[k] & better) | (highest[k] & ~better);
@@ -57,12 +67,10 @@ public:
     DistanceImage(const float* distance, const std::uint8_t* mask, int rows, int cols, float lowest, Team& team)
         : rows_(rows), cols_(cols), team_(team), level_((rows + 2) * stride(), 0) {
         parallel_for(rows, team, [&](int first, int last, int) {
-            for (int row = first; row < last; ++row)
-                for (int col = 0; col < cols; ++col) {
-                    const int k = row * cols + col;
-                    const bool exists = distance[k] > 0 && !(distance[k] < lowest) && (!mask || mask[k]);
-                    level_[index(row, col)] = exists ? bits_of(distance[k]) : 0;
-                }
+            for (int row = first; row < last; ++row) {
+                const std::ptrdiff_t begin = static_cast<std::ptrdiff_t>(row) * cols;
+                keep_levels(distance + begin, mask ? mask + begin : nullptr, cols, lowest, &level_[index(row, 0)]);
+            }
         });
     }
 
@@ -78,8 +86,14 @@ public:
     // Of two pixels of one distance, that of lower index is the higher.
     bool higher(int p, int q) const { return level_[p] > level_[q] || (level_[p] == level_[q] && p < q); }
 
-    Array<int> basins() const;
+    // The summit of every pixel, and all summits in raster order.
+    struct Basins {
+        Array<int> summit;
+        std::vector<int> summits;
+    };
+    Basins basins() const;
     std::vector<Pass> passes(const Array<int>& summit) const;
+    Team& team() const { return team_; }
     template <class F>
     void for_pixels(int first, int last, F&& visit) const {
         for (int row = first; row < last; ++row)
@@ -94,12 +108,17 @@ private:
     Array<std::int32_t> level_;  // bits of distances
 };
 
-// The summit of every pixel.
-Array<int> DistanceImage::basins() const {
-    Array<int> uphill(level_.size(), 0);
+DistanceImage::Basins DistanceImage::basins() const {
+    Basins basins{Array<int>(level_.size(), 0), {}};
+    Array<int>& uphill = basins.summit;
     const auto around = neighbours();
-    // A row at a time, without branches, so that many pixels are compared at once.
-    parallel_for(rows_, team_, [&](int first, int last, int) {
+    // Of every thread, in raster order: summits, and pixels from which the way leads into another band.
+    struct Found {
+        std::vector<int> summits, exits;
+    };
+    std::vector<Found> found(static_cast<std::size_t>(team_.size()));
+    parallel_for(rows_, team_, [&](int first, int last, int thread) {
+        // A row at a time, without branches, so that many pixels are compared at once.
         std::vector<std::int32_t> top(static_cast<std::size_t>(cols_));
         for (int row = first; row < last; ++row) {
             const int begin = index(row, 0);
@@ -112,14 +131,44 @@ Array<int> DistanceImage::basins() const {
             for (std::size_t k = 4; k < 8; ++k) keep_highest(own + around[k], around[k], cols_, top.data(), to);
             for (int k = 0; k < cols_; ++k) to[k] += begin + k;
         }
+        // Ways are shortened while they are followed.
+        auto& [summits, exits] = found[static_cast<std::size_t>(thread)];
+        const int band_begin = index(first, 0), band_end = index(last, 0);
+        const auto inside = [&](int q) { return q >= band_begin && q < band_end; };
+        for_pixels(first, last, [&](int p) {
+            int q = p;
+            while (inside(uphill[q]) && uphill[q] != q) {
+                const int next = uphill[uphill[q]];
+                if (!inside(next)) {
+                    q = uphill[q];
+                    break;
+                }
+                q = uphill[q] = next;
+            }
+            if (q == p && uphill[p] == p)
+                summits.push_back(p);
+            else if (q == p)
+                exits.push_back(p);
+            else
+                uphill[p] = q;
+        });
     });
-    // Ways are shortened while they are followed.
-    for_pixels(0, rows_, [&](int p) {
-        int q = p;
-        while (uphill[q] != q) q = uphill[q] = uphill[uphill[q]];
-        uphill[p] = q;
-    });
-    return uphill;
+    for (const Found& of_thread : found) {
+        basins.summits.insert(basins.summits.end(), of_thread.summits.begin(), of_thread.summits.end());
+        for (const int p : of_thread.exits) {
+            int q = p;
+            while (uphill[q] != q) q = uphill[q] = uphill[uphill[q]];
+            uphill[p] = q;
+        }
+    }
+    if (team_.size() > 1)
+        parallel_for(rows_, team_, [&](int first, int last, int) {
+            for_pixels(first, last, [&](int p) {
+                const int summit = uphill[uphill[p]];
+                if (summit != uphill[p]) uphill[p] = summit;
+            });
+        });
+    return basins;
 }
 
 // The highest pass between any two basins that touch, the highest first.
@@ -152,19 +201,16 @@ std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
 }
 
 // Summits that count by themselves.
-std::vector<int> peaks(const DistanceImage& image, const Array<int>& summit, float separation) {
-    std::vector<int> summits;
-    image.for_pixels(0, image.rows(), [&](int p) {
-        if (summit[p] == p) summits.push_back(p);
-    });
+std::vector<int> peaks(const DistanceImage& image, const DistanceImage::Basins& basins, float separation) {
     // Islands are known by the number of their highest summit, in raster order.
+    const std::vector<int>& summits = basins.summits;
     DisjointSets islands(static_cast<int>(summits.size()));
     const auto number = [&](int p) {
         return static_cast<int>(std::lower_bound(summits.begin(), summits.end(), p) - summits.begin());
     };
     const auto at = [&](int i) { return summits[static_cast<std::size_t>(i)]; };
     std::vector<int> found;
-    for (const Pass& pass : image.passes(summit)) {
+    for (const Pass& pass : image.passes(basins.summit)) {
         int low = islands.find(number(pass.a)), high = islands.find(number(pass.b));
         if (low == high) continue;
         if (image.higher(at(low), at(high))) std::swap(low, high);
@@ -182,37 +228,46 @@ int extract_seeds(const float* distance, const std::uint8_t* mask, int height, i
                   float separation, int threads, std::int32_t* markers) {
     Team team(threads);
     const DistanceImage image(distance, mask, height, width, separation * min_distance, team);
-    // Flood every seed from its peak.
-    Array<int> seed(image.size(), 0);
-    std::vector<int> stack;
-    int seeds = 0;
-    for (const int peak : peaks(image, image.basins(), separation)) {
-        if (image[peak] < min_distance) continue;
+    std::vector<int> wanted;
+    for (const int peak : peaks(image, image.basins(), separation))
+        if (!(image[peak] < min_distance)) wanted.push_back(peak);
+    const int seeds = static_cast<int>(wanted.size());
+    // Flood every seed from its peak. As they never touch, this may happen at once.
+    Array<int> seed(image.size(), 0), first(seeds);
+    parallel_each(seeds, team, [&](int s, int) {
+        const int peak = wanted[static_cast<std::size_t>(s)];
         // Where all is infinitely far, or `separation` vanishes in single precision, nothing but no pixel is too low.
         const float share = separation * image[peak];
         const std::int32_t least = bits_of(share > 0 ? share : std::numeric_limits<float>::denorm_min());
-        seed[peak] = ++seeds;
-        stack.assign(1, peak);
+        const auto around = image.neighbours();
+        seed[peak] = s + 1;
+        std::vector<int> stack(1, peak);
+        first[s] = peak;
         while (!stack.empty()) {
             const int p = stack.back();
             stack.pop_back();
-            for (const int step : image.neighbours()) {
+            first[s] = std::min(first[s], p);
+            for (const int step : around) {
                 if (!image.reaches(p + step, least) || seed[p + step]) continue;
-                seed[p + step] = seeds;
+                seed[p + step] = s + 1;
                 stack.push_back(p + step);
             }
         }
-    }
-    // Number them.
+    });
+    // Number them by their first pixels.
     Array<int> number(seeds + 1, 0);
-    int count = 0;
-    for (int row = 0; row < height; ++row)
-        for (int col = 0; col < width; ++col) {
-            const int own = seed[image.index(row, col)];
-            if (own && !number[own]) number[own] = ++count;
-            markers[row * width + col] = number[own];
+    std::vector<int> order(wanted.size());
+    for (int s = 0; s < seeds; ++s) order[static_cast<std::size_t>(s)] = s;
+    std::sort(order.begin(), order.end(), [&](int a, int b) { return first[a] < first[b]; });
+    for (int n = 0; n < seeds; ++n) number[order[static_cast<std::size_t>(n)] + 1] = n + 1;
+    parallel_for(height, team, [&](int begin, int end, int) {
+        for (int row = begin; row < end; ++row) {
+            const int* const own = &seed[image.index(row, 0)];
+            std::int32_t* const to = markers + static_cast<std::ptrdiff_t>(row) * width;
+            for (int col = 0; col < width; ++col) to[col] = number[own[col]];
         }
-    return count;
+    });
+    return seeds;
 }
 
 }  // namespace rangeedge
