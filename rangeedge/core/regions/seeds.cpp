@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -54,9 +55,30 @@ RANGEEDGE_WIDE void keep_highest(const std::int32_t* __restrict beside, std::int
     }
 }
 
+// Marks the pixels of a row from which one of the four neighbours after it differs.
+RANGEEDGE_WIDE void mark_borders(const int* __restrict own, int stride, int n, std::uint8_t* __restrict differ) {
+    const int* const below = own + stride;
+    for (int k = 0; k < n; ++k) {
+        const int a = own[k];
+        differ[k] = ((a ^ own[k + 1]) | (a ^ below[k - 1]) | (a ^ below[k]) | (a ^ below[k + 1])) != 0;
+    }
+}
+
+// Calls visit(k) where a mark is set; marks are followed by eight more bytes.
+template <class F>
+void for_marked(const std::uint8_t* marks, int n, F&& visit) {
+    std::uint64_t eight;
+    for (int k = 0; k < n; k += static_cast<int>(sizeof eight)) {
+        std::memcpy(&eight, marks + k, sizeof eight);
+        if (!eight) continue;
+        for (int i = k; i < std::min(k + static_cast<int>(sizeof eight), n); ++i)
+            if (marks[i]) visit(i);
+    }
+}
+
 struct Pass {
     std::int32_t level;  // bits of its distance
-    int a, b;            // summits on either side, in order of index
+    int a, b;            // summits on either side, by number; a < b
 
     bool same_sides(const Pass& other) const { return a == other.a && b == other.b; }
 };
@@ -86,7 +108,7 @@ public:
     // Of two pixels of one distance, that of lower index is the higher.
     bool higher(int p, int q) const { return level_[p] > level_[q] || (level_[p] == level_[q] && p < q); }
 
-    // The summit of every pixel, and all summits in raster order.
+    // The number of every pixel's summit, -1 of no pixel; and all summits in raster order.
     struct Basins {
         Array<int> summit;
         std::vector<int> summits;
@@ -134,23 +156,21 @@ DistanceImage::Basins DistanceImage::basins() const {
         // Ways are shortened while they are followed.
         auto& [summits, exits] = found[static_cast<std::size_t>(thread)];
         const int band_begin = index(first, 0), band_end = index(last, 0);
-        const auto inside = [&](int q) { return q >= band_begin && q < band_end; };
-        for_pixels(first, last, [&](int p) {
-            int q = p;
-            while (inside(uphill[q]) && uphill[q] != q) {
-                const int next = uphill[uphill[q]];
-                if (!inside(next)) {
-                    q = uphill[q];
-                    break;
-                }
-                q = uphill[q] = next;
-            }
-            if (q == p && uphill[p] == p)
+        const auto leaves = [=](int q) { return q < band_begin || q >= band_end; };
+        int* const up = uphill.data();
+        for_pixels(first, last, [&, up](int p) {
+            if (up[p] == p) {
                 summits.push_back(p);
-            else if (q == p)
+            } else if (leaves(up[p])) {
                 exits.push_back(p);
-            else
-                uphill[p] = q;
+            } else {
+                int q = up[p];
+                for (int next = up[q]; next != q && !leaves(next); next = up[q]) {
+                    if (!leaves(up[next])) up[q] = up[next];
+                    q = next;
+                }
+                up[p] = q;
+            }
         });
     });
     for (const Found& of_thread : found) {
@@ -161,39 +181,54 @@ DistanceImage::Basins DistanceImage::basins() const {
             uphill[p] = q;
         }
     }
-    if (team_.size() > 1)
-        parallel_for(rows_, team_, [&](int first, int last, int) {
-            for_pixels(first, last, [&](int p) {
-                const int summit = uphill[uphill[p]];
-                if (summit != uphill[p]) uphill[p] = summit;
-            });
-        });
+    const std::unique_ptr<int[]> number(new int[static_cast<std::size_t>(uphill.size())]);  // at summits alone
+    for (std::size_t k = 0; k < basins.summits.size(); ++k)
+        number[static_cast<std::size_t>(basins.summits[k])] = static_cast<int>(k);
+    Array<int> summit(level_.size(), -1);
+    parallel_for(rows_, team_, [&](int first, int last, int) {
+        for_pixels(first, last, [&](int p) { summit[p] = number[static_cast<std::size_t>(uphill[uphill[p]])]; });
+    });
+    uphill.swap(summit);
     return basins;
 }
 
-// The highest pass between any two basins that touch, the highest first.
+// The highest pass between any two basins that touch, and some lower ones; the highest first.
 std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
-    std::vector<std::vector<Pass>> found(static_cast<std::size_t>(team_.size()));
+    struct Found {
+        std::vector<Pass> passes;
+        std::array<std::size_t, 256> recent{};  // places of passes found lately, by their sides
+    };
+    std::vector<Found> found(static_cast<std::size_t>(team_.size()));
     const std::array<int, 4> forward{1, stride() - 1, stride(), stride() + 1};
     parallel_for(rows_, team_, [&](int first, int last, int thread) {
-        auto& passes = found[static_cast<std::size_t>(thread)];
-        for_pixels(first, last, [&](int p) {
-            if (((summit[p] ^ summit[p + 1]) | (summit[p] ^ summit[p + stride() - 1]) |
-                 (summit[p] ^ summit[p + stride()]) | (summit[p] ^ summit[p + stride() + 1])) == 0)
-                return;
-            for (const int step : forward) {
-                const int a = summit[p], b = summit[p + step];
-                if (a == b || !(level_[p + step] > 0)) continue;
-                const Pass pass{std::min(level_[p], level_[p + step]), std::min(a, b), std::max(a, b)};
-                if (!passes.empty() && passes.back().same_sides(pass))
-                    passes.back().level = std::max(passes.back().level, pass.level);
-                else
-                    passes.push_back(pass);
+        auto& [passes, recent] = found[static_cast<std::size_t>(thread)];
+        const auto add = [&passes = passes, &recent = recent](const Pass& pass) {
+            const auto slot = static_cast<std::size_t>(31 * pass.a + pass.b) % recent.size();
+            const std::size_t k = recent[slot];
+            if (k < passes.size() && passes[k].same_sides(pass)) {
+                passes[k].level = std::max(passes[k].level, pass.level);
+            } else {
+                recent[slot] = passes.size();
+                passes.push_back(pass);
             }
-        });
+        };
+        std::vector<std::uint8_t> differ(static_cast<std::size_t>(cols_) + sizeof(std::uint64_t));
+        for (int row = first; row < last; ++row) {
+            const int begin = index(row, 0);
+            mark_borders(&summit[begin], stride(), cols_, differ.data());
+            for_marked(differ.data(), cols_, [&](int col) {
+                const int p = begin + col, a = summit[p];
+                if (a < 0) return;
+                for (const int step : forward) {
+                    const int b = summit[p + step];
+                    if (a == b || b < 0) continue;
+                    add({std::min(level_[p], level_[p + step]), std::min(a, b), std::max(a, b)});
+                }
+            });
+        }
     });
     std::vector<Pass> all;
-    for (const auto& passes : found) all.insert(all.end(), passes.begin(), passes.end());
+    for (const Found& of_thread : found) all.insert(all.end(), of_thread.passes.begin(), of_thread.passes.end());
     std::sort(all.begin(), all.end(), [](const Pass& m, const Pass& n) {
         return m.level != n.level ? m.level > n.level : std::make_pair(m.a, m.b) < std::make_pair(n.a, n.b);
     });
@@ -205,13 +240,10 @@ std::vector<int> peaks(const DistanceImage& image, const DistanceImage::Basins& 
     // Islands are known by the number of their highest summit, in raster order.
     const std::vector<int>& summits = basins.summits;
     DisjointSets islands(static_cast<int>(summits.size()));
-    const auto number = [&](int p) {
-        return static_cast<int>(std::lower_bound(summits.begin(), summits.end(), p) - summits.begin());
-    };
     const auto at = [&](int i) { return summits[static_cast<std::size_t>(i)]; };
     std::vector<int> found;
     for (const Pass& pass : image.passes(basins.summit)) {
-        int low = islands.find(number(pass.a)), high = islands.find(number(pass.b));
+        int low = islands.find(pass.a), high = islands.find(pass.b);
         if (low == high) continue;
         if (image.higher(at(low), at(high))) std::swap(low, high);
         if (value_of(pass.level) < separation * image[at(low)]) found.push_back(at(low));
@@ -242,17 +274,18 @@ int extract_seeds(const float* distance, const std::uint8_t* mask, int height, i
         const auto around = image.neighbours();
         seed[peak] = s + 1;
         std::vector<int> stack(1, peak);
-        first[s] = peak;
+        int lowest = peak;
         while (!stack.empty()) {
             const int p = stack.back();
             stack.pop_back();
-            first[s] = std::min(first[s], p);
+            lowest = std::min(lowest, p);
             for (const int step : around) {
                 if (!image.reaches(p + step, least) || seed[p + step]) continue;
                 seed[p + step] = s + 1;
                 stack.push_back(p + step);
             }
         }
+        first[s] = lowest;
     });
     // Number them by their first pixels.
     Array<int> number(seeds + 1, 0);
