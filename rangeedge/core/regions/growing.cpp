@@ -16,7 +16,7 @@ namespace rangeedge {
 namespace {
 
 constexpr double tile_tolerance = 0.8;       // root mean square misfit of a tile, in tolerances of a pixel
-constexpr double good_tolerance = 0.5;       // of tiles that come first, likewise, as a share of that
+constexpr double shares[]{0.5, 1};           // of the mean square misfit: tiles that fit well come first
 constexpr int rounds_between_tiles = 8;      // of pixels
 constexpr int worth_tiles = 500;             // pixels that grew meanwhile
 constexpr int most_adjustments = 8;          // rounds at borders
@@ -139,8 +139,7 @@ void Grower::over_tiles(const Tiles& tiles) {
     tiles_.clear(), taken_.clear();
     for (const auto& of_thread : found) tiles_.insert(tiles_.end(), of_thread.begin(), of_thread.end());
     const double limit = tile_tolerance * tile_tolerance * limit_;
-    over_tiles(tiles, good_tolerance * good_tolerance * limit);
-    over_tiles(tiles, limit);
+    for (const double share : shares) over_tiles(tiles, share * limit);
     for (const int t : taken_)
         for_around(tiles, t, image_.stride(), [&](int q) {
             if (patches_.is_free(q, reach_)) wait(q);
