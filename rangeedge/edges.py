@@ -128,7 +128,7 @@ def splitScanLine(z: np.ndarray, eps: float, pixelSize: float | np.ndarray = 1.0
     z = array("z", z, "a real array of shape (N,)", ndim=(1,))
     eps = number("eps", eps, 0)
     y = _line(z, np.float64 if z.dtype.itemsize > 4 or z.dtype.kind != "f" else np.float32)
-    if np.ndim(pixelSize) == 0:
+    if not isinstance(pixelSize, np.ndarray):
         x = None
         number("pixelSize", pixelSize, 0, above=True)
     else:

@@ -27,8 +27,10 @@ private:
     int& region(int p) { return region_[static_cast<std::size_t>(p)]; }
     template <class F>
     void for_pixels(F&& visit) const {
-        for (int row = 0; row < image_.rows(); ++row)
+        for (int row = 0; row < image_.rows(); ++row) {
+            Watch::checkpoint();
             for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; ++p) visit(p);
+        }
     }
     bool lies_on(const Pixels& pixels, const Surface& surface) const;
     bool is_surface(const Pixels& pixels) const;
@@ -69,8 +71,10 @@ bool Closer::erode(std::vector<std::uint8_t>& mask, bool square) const {
     set_margin(1);
     const std::vector<std::uint8_t> before = mask;
     const std::uint8_t* const m = before.data();
+    Checkpoints checkpoints;
     for (int row = 0; row < image_.rows(); ++row)
         for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; ++p) {
+            checkpoints.pass();
             int kept = m[p] & m[p - s] & m[p - 1] & m[p + 1] & m[p + s];
             if (square) kept &= m[p - s - 1] & m[p - s + 1] & m[p + s - 1] & m[p + s + 1];
             mask[static_cast<std::size_t>(p)] = static_cast<std::uint8_t>(kept);
@@ -90,7 +94,9 @@ void Closer::verify() {
         const Components parts(pending.data(), image_.rows(), image_.cols());
         std::fill(pending.begin(), pending.end(), std::uint8_t{0});
         bool failed = false;
+        Checkpoints checkpoints(256);
         for (int i = 0; i < parts.count(); ++i) {
+            checkpoints.pass();
             if (parts.area(i) < parameters_.min_area) continue;
             pixels.clear();
             for (const auto [begin, end] : parts.runs(i))
@@ -110,6 +116,7 @@ void Closer::verify() {
 // A pixel at a time; where regions meet, the one of higher number comes first.
 void Closer::grow_back() {
     Pixels front, next;
+    Checkpoints checkpoints;
     const auto reach = [&](int from, int label) {
         for (const int step : image_.neighbours()) {
             int& other = region(from + step);
@@ -125,7 +132,10 @@ void Closer::grow_back() {
         front.swap(next);
         next.clear();
         for (const int p : front) region(p) = -region(p);
-        for (const int p : front) reach(p, region(p));
+        for (const int p : front) {
+            checkpoints.pass();
+            reach(p, region(p));
+        }
     }
 }
 

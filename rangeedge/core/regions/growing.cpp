@@ -73,7 +73,7 @@ void Grower::start(PatchMap::Free reach, double tolerance) {
 
 void Grower::wait(int p) {
     if (waiting_[p]) return;
-    waiting_[p] = 1;
+    waiting_[p] = pixel_waits;
     front_.push_back(p);
 }
 
@@ -156,7 +156,9 @@ void Grower::over_tiles(const Tiles& tiles, double limit) {
         choices_.assign(tiles_.size(), {});
         sums_.resize(std::max(sums_.size(), tiles_.size()));
         const auto choose_all = [&](int begin, int end, int) {
+            Checkpoints checkpoints(256);
             for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+                checkpoints.pass();
                 if (!is_free(tiles, tiles_[k])) continue;
                 sums_[k] = tiles.sums(tiles_[k]);
                 choices_[k] = choose(tiles, tiles_[k], sums_[k]);
@@ -173,7 +175,7 @@ void Grower::over_tiles(const Tiles& tiles, double limit) {
         });
         const std::size_t before = taken_.size();
         for (std::size_t k = 0; k < tiles_.size(); ++k) {
-            waiting_[tiles.first_pixel(tiles_[k])] = 0;
+            waiting_[tiles.first_pixel(tiles_[k])] &= pixel_waits;
             if (choices_[k].patch) (choices_[k].residual < limit ? taken_ : rejected_).push_back(tiles_[k]);
         }
         tiles_.clear();
@@ -184,8 +186,8 @@ void Grower::over_tiles(const Tiles& tiles, double limit) {
                   std::make_pair(col > 0, t - 1), std::make_pair(col + 1 < tiles.cols(), t + 1)}) {
                 if (!inside || !tiles.is_open(beside)) continue;
                 std::uint8_t& waiting = waiting_[tiles.first_pixel(beside)];
-                if (waiting || !patches_.is_free(tiles.first_pixel(beside), reach_)) continue;
-                waiting = 1;
+                if (waiting & tile_waits || !patches_.is_free(tiles.first_pixel(beside), reach_)) continue;
+                waiting |= tile_waits;
                 tiles_.push_back(beside);
             }
         }
@@ -213,7 +215,9 @@ Grower::Choice Grower::choose(int p) const {
 template <class F>
 void Grower::for_front(F&& visit) {
     const auto visit_all = [&](int begin, int end, int) {
+        Checkpoints checkpoints;
         for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+            checkpoints.pass();
             patches_.prefetch(front_[std::min(k + prefetched, front_.size() - 1)]);
             visit(k);
         }
@@ -228,7 +232,9 @@ void Grower::for_front(F&& visit) {
 // Choices become true. Every patch belongs to one thread, which adds its pixels in order.
 void Grower::commit(bool refit) {
     for_patches(front_.size() >= worth_threads, [&](auto&& mine) {
+        Checkpoints checkpoints;
         for (std::size_t k = 0; k < front_.size(); ++k) {
+            checkpoints.pass();
             const int p = front_[k], i = choices_[k].patch;
             patches_.prefetch(front_[std::min(k + prefetched, front_.size() - 1)]);
             if (!mine(i)) continue;
@@ -253,12 +259,15 @@ int Grower::over_pixels(int rounds, bool refit) {
         commit(refit);
         next_.swap(front_);
         front_.clear();
-        for (std::size_t k = 0; k < next_.size(); ++k)
+        Checkpoints checkpoints;
+        for (std::size_t k = 0; k < next_.size(); ++k) {
+            checkpoints.pass();
             if (choices_[k].patch) {
                 ++count;
                 for (const int step : image_.neighbours())
                     if (patches_.is_free(next_[k] + step, reach_)) wait(next_[k] + step);
             }
+        }
     }
     return count;
 }
@@ -286,7 +295,9 @@ void Grower::adjust_borders() {
         next_.swap(front_);
         front_.clear();
         for (const int p : next_) waiting_[p] = 0;
+        Checkpoints checkpoints;
         for (std::size_t k = 0; k < next_.size(); ++k) {
+            checkpoints.pass();
             const int p = next_[k];
             if (choices_[k].patch == patches_[p]) continue;
             patches_.take(p, choices_[k].patch);

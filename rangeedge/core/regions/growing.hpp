@@ -49,8 +49,10 @@ private:
     PatchMap& patches_;
     const SurfaceImage& image_;
     PatchMap::Free reach_ = PatchMap::open_pixel;
-    double limit_ = 0;             // of squared residuals
-    Array<std::uint8_t> waiting_;  // whether a pixel is in front_, or a tile in tiles_
+    double limit_ = 0;  // of squared residuals
+    // Whether a pixel is in front_, or the tile that begins with it in tiles_.
+    static constexpr std::uint8_t pixel_waits = 1, tile_waits = 2;
+    Array<std::uint8_t> waiting_;
     std::vector<int> front_, next_;
     std::vector<int> tiles_, rejected_, taken_;
     std::vector<SurfaceSums> sums_;  // of tiles_

@@ -83,22 +83,30 @@ struct Pass {
     bool same_sides(const Pass& other) const { return a == other.a && b == other.b; }
 };
 
-// A distance map in an image with a margin of one pixel; 0 is no pixel.
+// A distance map in an image with a margin of one pixel; 0 is no pixel. Where it wraps, the margin beside the first
+// column is a copy of the last column and the other way round, and `own` tells the pixel itself.
 class DistanceImage {
 public:
-    DistanceImage(const float* distance, const std::uint8_t* mask, int rows, int cols, float lowest, Team& team)
-        : rows_(rows), cols_(cols), team_(team), level_((rows + 2) * stride(), 0) {
+    DistanceImage(const float* distance, const std::uint8_t* mask, int rows, int cols, bool wrap, float lowest,
+                  Team& team)
+        : rows_(rows), cols_(cols), wrap_(wrap), team_(team), level_((rows + 2) * stride(), 0) {
         parallel_for(rows, team, [&](int first, int last, int) {
             for (int row = first; row < last; ++row) {
                 const std::ptrdiff_t begin = static_cast<std::ptrdiff_t>(row) * cols;
                 keep_levels(distance + begin, mask ? mask + begin : nullptr, cols, lowest, &level_[index(row, 0)]);
             }
         });
+        copy_around(level_);
     }
 
     int stride() const { return cols_ + 2; }
     int index(int row, int col) const { return (row + 1) * stride() + col + 1; }
     int size() const { return level_.count(); }
+    int own(int p) const {
+        if (!wrap_) return p;
+        const int col = p % stride();
+        return col == 0 ? p + cols_ : col > cols_ ? p - cols_ : p;
+    }
     float operator[](int p) const { return value_of(level_[p]); }
     bool reaches(int p, std::int32_t least) const { return level_[p] >= least; }
     std::array<int, 8> neighbours() const {
@@ -115,17 +123,33 @@ public:
     };
     Basins basins() const;
     std::vector<Pass> passes(const Array<int>& summit) const;
-    Team& team() const { return team_; }
     template <class F>
     void for_pixels(int first, int last, F&& visit) const {
-        for (int row = first; row < last; ++row)
+        for (int row = first; row < last; ++row) {
+            Watch::checkpoint();
             for (int p = index(row, 0), end = p + cols_; p < end; ++p)
                 if (level_[p] > 0) visit(p);
+        }
     }
     int rows() const { return rows_; }
 
 private:
+    void copy_around(Array<std::int32_t>& values) const {
+        for (int row = 0; wrap_ && row < rows_; ++row) {
+            const int first = index(row, 0), last = index(row, cols_ - 1);
+            values[first - 1] = values[last], values[last + 1] = values[first];
+        }
+    }
+    // The highest of a pixel and its neighbours.
+    int highest_around(int p) const {
+        int top = p;
+        for (const int step : neighbours())
+            if (const int q = own(p + step); higher(q, top)) top = q;
+        return top;
+    }
+
     int rows_, cols_;
+    bool wrap_;
     Team& team_;
     Array<std::int32_t> level_;  // bits of distances
 };
@@ -152,6 +176,8 @@ DistanceImage::Basins DistanceImage::basins() const {
             keep_highest(own, 0, cols_, top.data(), to);
             for (std::size_t k = 4; k < 8; ++k) keep_highest(own + around[k], around[k], cols_, top.data(), to);
             for (int k = 0; k < cols_; ++k) to[k] += begin + k;
+            if (!wrap_) continue;
+            for (const int k : {0, cols_ - 1}) to[k] = highest_around(begin + k);  // of copies the index is another
         }
         // Ways are shortened while they are followed.
         auto& [summits, exits] = found[static_cast<std::size_t>(thread)];
@@ -188,6 +214,7 @@ DistanceImage::Basins DistanceImage::basins() const {
     parallel_for(rows_, team_, [&](int first, int last, int) {
         for_pixels(first, last, [&](int p) { summit[p] = number[static_cast<std::size_t>(uphill[uphill[p]])]; });
     });
+    copy_around(summit);
     uphill.swap(summit);
     return basins;
 }
@@ -203,7 +230,8 @@ std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
     parallel_for(rows_, team_, [&](int first, int last, int thread) {
         auto& [passes, recent] = found[static_cast<std::size_t>(thread)];
         const auto add = [&passes = passes, &recent = recent](const Pass& pass) {
-            const auto slot = static_cast<std::size_t>(31 * pass.a + pass.b) % recent.size();
+            const auto slot =
+                (31 * static_cast<std::size_t>(pass.a) + static_cast<std::size_t>(pass.b)) % recent.size();
             const std::size_t k = recent[slot];
             if (k < passes.size() && passes[k].same_sides(pass)) {
                 passes[k].level = std::max(passes[k].level, pass.level);
@@ -214,6 +242,7 @@ std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
         };
         std::vector<std::uint8_t> differ(static_cast<std::size_t>(cols_) + sizeof(std::uint64_t));
         for (int row = first; row < last; ++row) {
+            Watch::checkpoint();
             const int begin = index(row, 0);
             mark_borders(&summit[begin], stride(), cols_, differ.data());
             for_marked(differ.data(), cols_, [&](int col) {
@@ -229,7 +258,9 @@ std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
     });
     std::vector<Pass> all;
     for (const Found& of_thread : found) all.insert(all.end(), of_thread.passes.begin(), of_thread.passes.end());
-    std::sort(all.begin(), all.end(), [](const Pass& m, const Pass& n) {
+    Checkpoints checkpoints;
+    std::sort(all.begin(), all.end(), [&](const Pass& m, const Pass& n) {
+        checkpoints.pass();
         return m.level != n.level ? m.level > n.level : std::make_pair(m.a, m.b) < std::make_pair(n.a, n.b);
     });
     return all;
@@ -242,7 +273,9 @@ std::vector<int> peaks(const DistanceImage& image, const DistanceImage::Basins& 
     DisjointSets islands(static_cast<int>(summits.size()));
     const auto at = [&](int i) { return summits[static_cast<std::size_t>(i)]; };
     std::vector<int> found;
+    Checkpoints checkpoints;
     for (const Pass& pass : image.passes(basins.summit)) {
+        checkpoints.pass();
         int low = islands.find(pass.a), high = islands.find(pass.b);
         if (low == high) continue;
         if (image.higher(at(low), at(high))) std::swap(low, high);
@@ -256,10 +289,10 @@ std::vector<int> peaks(const DistanceImage& image, const DistanceImage::Basins& 
 
 }  // namespace
 
-int extract_seeds(const float* distance, const std::uint8_t* mask, int height, int width, float min_distance,
+int extract_seeds(const float* distance, const std::uint8_t* mask, int height, int width, bool wrap, float min_distance,
                   float separation, int threads, std::int32_t* markers) {
     Team team(threads);
-    const DistanceImage image(distance, mask, height, width, separation * min_distance, team);
+    const DistanceImage image(distance, mask, height, width, wrap, separation * min_distance, team);
     std::vector<int> wanted;
     for (const int peak : peaks(image, image.basins(), separation))
         if (!(image[peak] < min_distance)) wanted.push_back(peak);
@@ -275,14 +308,17 @@ int extract_seeds(const float* distance, const std::uint8_t* mask, int height, i
         seed[peak] = s + 1;
         std::vector<int> stack(1, peak);
         int lowest = peak;
+        Checkpoints checkpoints;
         while (!stack.empty()) {
+            checkpoints.pass();
             const int p = stack.back();
             stack.pop_back();
             lowest = std::min(lowest, p);
             for (const int step : around) {
-                if (!image.reaches(p + step, least) || seed[p + step]) continue;
-                seed[p + step] = s + 1;
-                stack.push_back(p + step);
+                const int q = image.own(p + step);
+                if (!image.reaches(q, least) || seed[q]) continue;
+                seed[q] = s + 1;
+                stack.push_back(q);
             }
         }
         first[s] = lowest;
