@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._check import error
 from .adjacency import regionAdjacency
+from .boundaries import RegionBoundaries, RegionBoundary, regionBoundaries
 from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
 from .cleaning import cleanDepth
@@ -48,6 +49,7 @@ from .distance import (
 )
 from .draw import (
     colorizeDistance,
+    drawBoundaries,
     drawChains,
     drawEdges,
     drawExplanation,
@@ -130,12 +132,16 @@ __all__ = [  # noqa: RUF022
     "growRegionsWithStats",
     "segmentRegions",
     "segmentRegionsWithStats",
+    "RegionBoundary",
+    "RegionBoundaries",
+    "regionBoundaries",
     "regionAdjacency",
     "cleanDepth",
     "drawEdges",
     "drawChains",
     "drawSegments",
     "drawRegions",
+    "drawBoundaries",
     "colorizeDistance",
     "drawOverview",
     "drawPanels",
