@@ -9,8 +9,12 @@ from ._check import error
 from .adjacency import regionAdjacency
 from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
+from .cleaning import cleanDepth
 from .closure import closeContours
 from .constants import (
+    CLEAN_FILLED,
+    CLEAN_REMOVED,
+    CLEAN_SMOOTHED,
     CREASE_MAX,
     CREASE_NORMAL,
     DIR_ALL,
@@ -42,10 +46,20 @@ from .distance import (
     salienceDistanceTransform,
     salienceDistanceTransformWithLabels,
 )
-from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
-from .draw_lines import drawChains, drawSegments
+from .draw import (
+    colorizeDistance,
+    drawChains,
+    drawEdges,
+    drawExplanation,
+    drawOverview,
+    drawPanels,
+    drawRegions,
+    drawSegments,
+)
 from .edges import EdgeStrength, edgePoints, edgeStrength, kindNames, splitScanLine
+from .explain import Explanation, explainPixel
 from .flying import flyingPixels
+from .frames import mapFrames
 from .io import RangeImage, imreadRange, imwriteRange
 from .io.lines import writeLines
 from .noise import estimateNoise
@@ -94,8 +108,11 @@ __all__ = [  # noqa: RUF022
     "thinEdges",
     "detectEdges",
     "detectEdgesWithStrength",
+    "Explanation",
+    "explainPixel",
     "ScanLineDetector",
     "createScanLineDetector",
+    "mapFrames",
     "EdgeChain",
     "EdgeChains",
     "linkEdges",
@@ -114,12 +131,15 @@ __all__ = [  # noqa: RUF022
     "segmentRegions",
     "segmentRegionsWithStats",
     "regionAdjacency",
+    "cleanDepth",
     "drawEdges",
     "drawChains",
     "drawSegments",
     "drawRegions",
     "colorizeDistance",
     "drawOverview",
+    "drawPanels",
+    "drawExplanation",
     "DIR_ROWS",
     "DIR_COLS",
     "DIR_DIAG45",
@@ -137,6 +157,9 @@ __all__ = [  # noqa: RUF022
     "EDGE_OCCLUDING",
     "EDGE_OCCLUDED",
     "EDGE_BOUNDARY",
+    "CLEAN_SMOOTHED",
+    "CLEAN_REMOVED",
+    "CLEAN_FILLED",
     "THIN_SKELETON",
     "THIN_LEE",
     "THIN_ITERATIVE",

@@ -253,6 +253,15 @@ def pixel_size(name: str, value: Any) -> tuple[float, float]:
     return dx, dy
 
 
+def image_size(name: str, value: Any) -> tuple[int, int]:
+    """Width and height of an image."""
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        raise fail(name, "a width and a height in pixels", described(value), cv2.Error.StsBadSize)
+    width, height = (integer(name, side, 1) for side in value)
+    return width, height
+
+
 def deliver(name: str, result: np.ndarray, dst: np.ndarray | None) -> np.ndarray:
     """`result`, written into `dst` where that has its shape and dtype, as cv2 does it.
 

@@ -9,8 +9,10 @@ import numpy as np
 from . import _core
 from ._check import deliver, image8
 from ._option import parsed, takes
+from .frame import Frame
 from .noise import measured_frame
 from .options import CLOSING, Closing, ScanLineParams
+from .sectors import sectors_of
 from .surfaces import surface_map
 
 if TYPE_CHECKING:
@@ -83,6 +85,16 @@ def closeContours(
     params, closing = parsed(options, ScanLineParams, Closing)
     frame = measured_frame(src, params, mask)
     edges = image8("edges", edges, frame.shape)
+    return deliver("dst", _closed(frame, edges, closing), dst)
+
+
+def _closed(frame: Frame, edges: np.ndarray, closing: Closing) -> np.ndarray:
+    parts = sectors_of(frame)
+    if parts:
+        whole = np.empty(frame.shape, np.uint8)
+        for part in parts:
+            part.put(whole, _closed(part.frame, part.take(edges), closing))
+        return whole
     kernel_options = _core.ClosureOptions(
         correlation=frame.correlation,
         tolerance=closing.tolerance,
@@ -92,8 +104,7 @@ def closeContours(
     )
     regions = np.empty(frame.shape, np.int32)
     _core.verified_regions(surface_map(frame, edges), kernel_options, frame.threads, regions)
-    closed = ((edges != 0) | _meetings(regions)).view(np.uint8) * np.uint8(255)
-    return deliver("dst", closed, dst)
+    return ((edges != 0) | _meetings(regions)).view(np.uint8) * np.uint8(255)
 
 
 def _meetings(regions: np.ndarray) -> np.ndarray:

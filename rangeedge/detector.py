@@ -19,6 +19,7 @@ from .frame import Frame
 from .noise import measured_frame
 from .options import DETECTION, SELECTION, ScanLineParams, Selection
 from .plausible import warn_of_thresholds
+from .sectors import around
 from .selection import select_strength
 from .thinning import thinEdges
 
@@ -155,7 +156,17 @@ def run_detector(frame: Frame, params: ScanLineParams, selection: Selection) -> 
     """The edges of a checked range image: strengths, those of them that count, and their middle lines."""
     warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
     strength = measure_strength(frame, params)
-    return thinEdges(select_strength(strength, selection)), strength
+    return thin_lines(frame, selected(frame, strength, selection)), strength
+
+
+def selected(frame: Frame, strength: EdgeStrength, selection: Selection) -> np.ndarray:
+    """The strengths of a range image that count, as a map."""
+    return around(frame, lambda *maps, wrap: select_strength(EdgeStrength(*maps), selection, wrap), *strength)
+
+
+def thin_lines(frame: Frame, edges: np.ndarray) -> np.ndarray:
+    """The middle lines of an edge map of a range image."""
+    return around(frame, thinEdges, edges)
 
 
 @public

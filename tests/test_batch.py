@@ -13,6 +13,7 @@ from rangeedge.app.results import EDGE_FILES, plain
 from rangeedge.batch import detectBatch
 
 K = np.array([[50, 0, 19.5], [0, 50, 14.5], [0, 0, 1]])
+LEDGER = {"manifest.jsonl", ".manifest.jsonl.lock"}  # beside the results
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ def test_failures_do_not_stop_the_others(images, tmp_path, jobs):
     assert states(items) == ["written", "failed", "written"]
     assert "none of PNG" in items[1].message
     assert items[0].message == ""
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"frame0", "frame2"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"frame0", "frame2", *LEDGER}
     assert {path.name for path in (tmp_path / "out" / "frame2").iterdir()} == set(EDGE_FILES)
 
 
@@ -124,10 +125,21 @@ def test_options_as_json():
     assert plain(np.array([1, -np.inf])) == [1, "-inf"]
 
 
-def test_two_images_of_one_name(images, tmp_path):
-    with pytest.raises(error, match="same folder"):
-        detectBatch([images[0], images[0].with_suffix(".tiff")], tmp_path / "out")
-    with pytest.raises(error, match="same folder"):
+def test_images_of_one_name_keep_their_suffix_or_their_folders(images, tmp_path):
+    other = images[0].with_suffix(".tiff")
+    imwriteRange(other, np.full((30, 40), 1500, np.uint16))
+    items = list(detectBatch([images[0], other], tmp_path / "one", K=K))
+    assert [Path(item.folder).name for item in items] == ["frame0.png", "frame0.tiff"]
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "frame0.png").write_bytes(images[0].read_bytes())
+    items = list(detectBatch([*images, tmp_path / "more" / "frame0.png"], tmp_path / "two", K=K))
+    folders = [Path(item.folder).relative_to(tmp_path / "two").as_posix() for item in items]
+    assert folders == [f"{tmp_path.name}/frame0", "frame1", "frame2", "more/frame0"]
+    assert all((tmp_path / "two" / folder / "report.json").exists() for folder in (folders[0], folders[3]))
+
+
+def test_one_image_twice(images, tmp_path):
+    with pytest.raises(error, match="is given twice"):
         detectBatch([images[0], images[0]], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -155,15 +167,22 @@ def test_names_of_dots_stay_in_the_folder(images, tmp_path):
     items = list(detectBatch([tmp_path / name for name in names], tmp_path / "a" / "b", K=K))
     assert states(items) == ["written"] * 5
     folders = {"..png", "...png", "....png", ".png", "a."}
-    assert {path.name for path in (tmp_path / "a" / "b").iterdir()} == folders
+    assert {path.name for path in (tmp_path / "a" / "b").iterdir()} == folders | LEDGER
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["b"]
     assert all((tmp_path / "a" / "b" / name / "report.json").is_file() for name in folders)
 
 
-@pytest.mark.parametrize("name", ["", ".", "..", "a/..", "/"])
+@pytest.mark.parametrize("name", ["", "a/..", "..."])
 def test_what_names_no_file(tmp_path, name):
-    with pytest.raises(error, match="`paths` must be names of files"):
+    with pytest.raises(error, match="`inputs` must be names of files"):
         detectBatch([name], tmp_path)
+
+
+def test_a_folder_without_images(tmp_path):
+    with pytest.raises(error, match="holds no range images"):
+        detectBatch([tmp_path], tmp_path / "out")
+    with pytest.raises(error, match="no file fits the pattern"):
+        detectBatch([tmp_path / "*.png"], tmp_path / "out")
 
 
 def test_bad_names(images, tmp_path):

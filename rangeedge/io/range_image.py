@@ -19,7 +19,7 @@ class RangeImage(_SourceAndGeometry):
     ----------
     src : (H, W) integers or floats, or (H, W, 3) or (H, W, 4) float points
     geometry : dict
-        Those of `K`, `pixelSize`, `heightMap` and `depthFactor` that the file knows.
+        Those of `K`, `distCoeffs`, `pixelSize`, `heightMap` and `depthFactor` that the file knows.
     viewpoint : tuple of 7 floats or None
         Where the points were taken from, in their own frame: translation (x, y, z) and unit quaternion (w, x, y, z) of
         the sensor, as PCD files have it. None where the file does not say.

@@ -30,14 +30,24 @@ _KINDS = {1: "u", 2: "i", 3: "f", 4: "u"}  # by sample format
 
 def read_tiff(data: bytes) -> RangeImage:
     """The only image of the file; overviews and masks beside it are passed over."""
-    reduced, mask = 1, 4
-    found = [page for page in tag.pages(data) if not page.value(tag.NEW_SUBFILE_TYPE, 0) & (reduced | mask)]
+    found = images_of_tiff(data, tag.PAGES)
     if len(found) != 1:
         raise ValueError(
             f"it holds {len(found)} images; store the one that is meant in a file of its own (x, y and z as the three "
             "channels of one image)"
         )
-    return described_by(found[0], _pixels(found[0], data))
+    return read_page(found[0])
+
+
+def images_of_tiff(data: bytes, limit: int) -> list[Page]:
+    """The pages that are images, of at most `limit` pages."""
+    reduced, mask = 1, 4
+    return [page for page in tag.pages(data, limit) if not page.value(tag.NEW_SUBFILE_TYPE, 0) & (reduced | mask)]
+
+
+def read_page(page: Page) -> RangeImage:
+    """One image of a file."""
+    return described_by(page, _pixels(page, page.data))
 
 
 def _pixels(page: Page, data: bytes) -> np.ndarray:

@@ -7,9 +7,11 @@ namespace rangeedge::python {
 void bind_cancellation(nanobind::module_& m);
 void bind_image(nanobind::module_& m);
 void bind_edges(nanobind::module_& m);
+void bind_explain(nanobind::module_& m);
 void bind_chains(nanobind::module_& m);
 void bind_distance(nanobind::module_& m);
 void bind_regions(nanobind::module_& m);
+void bind_cleaning(nanobind::module_& m);
 void bind_io(nanobind::module_& m);
 
 }  // namespace rangeedge::python
@@ -19,8 +21,10 @@ NB_MODULE(_core, m) {
     rangeedge::python::bind_cancellation(m);
     rangeedge::python::bind_image(m);
     rangeedge::python::bind_edges(m);
+    rangeedge::python::bind_explain(m);
     rangeedge::python::bind_chains(m);
     rangeedge::python::bind_distance(m);
     rangeedge::python::bind_regions(m);
+    rangeedge::python::bind_cleaning(m);
     rangeedge::python::bind_io(m);
 }

@@ -35,9 +35,9 @@ struct BoundMap {
     RangeMap map;
 };
 
-int bound_extract_seeds(const Image<float>& distance, const Image<std::uint8_t>& mask, float min_distance,
+int bound_extract_seeds(const Image<float>& distance, const Image<std::uint8_t>& mask, bool wrap, float min_distance,
                         float separation, int threads, const OutImage<std::int32_t>& markers) {
-    return extract_seeds(distance.data(), mask.data(), rows(distance), cols(distance), min_distance, separation,
+    return extract_seeds(distance.data(), mask.data(), rows(distance), cols(distance), wrap, min_distance, separation,
                          threads, markers.data());
 }
 
@@ -89,7 +89,7 @@ void bind_regions(nb::module_& m) {
     using C = ClosureParameters;
     bind_options(m, "ClosureOptions", field("correlation", &C::correlation), field("tolerance", &C::tolerance),
                  field("share", &C::share), field("dilations", &C::dilations), field("min_area", &C::min_area));
-    m.def("extract_seeds", &bound_extract_seeds, array("distance"), optional_array("mask"), "min_distance"_a,
+    m.def("extract_seeds", &bound_extract_seeds, array("distance"), optional_array("mask"), "wrap"_a, "min_distance"_a,
           "separation"_a, "threads"_a, array("markers"), Unlocked());
     m.def("grow_regions", &bound_grow_regions, "map"_a, array("markers"), "options"_a, "threads"_a, array("labels"),
           Unlocked());
