@@ -97,7 +97,7 @@ def regionAdjacency(
     """
     (params,) = parsed(options, ScanLineParams)
     frame = measured_frame(src, params, mask)
-    labels = np.where(frame.valid > 0, np.maximum(labels32s("labels", labels, frame.shape), 0), 0)
+    labels = np.where(frame.valid > 0, np.maximum(labels32s("labels", labels, frame.shape, listed=True), 0), 0)
     gap = integer("gap", gap, 0, 64)
     minContacts = integer("minContacts", minContacts, 1)
     i, j = _contacts(labels, gap, frame.seam)

@@ -100,7 +100,7 @@ def _transform(transform: Sequence[float], suffix: str) -> list[float]:
     values = np.asarray(transform, dtype=object)
     try:
         numbers = [float(value) for value in values.ravel()]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         numbers = []
     if len(numbers) != 6 or not np.isfinite(numbers).all():
         raise fail("transform", "six finite numbers", described(transform))
