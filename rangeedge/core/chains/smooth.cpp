@@ -51,7 +51,7 @@ public:
     Smoother(const Piece& chain, const Frame<T>& frame, const std::vector<Candidate>& candidates,
              const Crossings& crossings)
         : chain_(chain), frame_(frame), candidates_(candidates), crossings_(crossings),
-          jumps_(chain.type == EdgeClass::jump) {}
+          jumps_(is_one_sided(chain.type)) {}
 
     SmoothChain smooth() {
         gather();
