@@ -1,4 +1,4 @@
-"""The command `rangeedge`: detect, segment, lines, batch, demo and bench."""
+"""The command `rangeedge`: detect, segment, lines, explain, batch, demo and bench."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ import numpy as np
 from .. import __version__
 from .._check import error, named
 from .._option import Option
+from ..io.atomic import write_atomically
 from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing, Linking
 from .batch import detect_file, read_image
 from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
@@ -25,6 +26,7 @@ from .results import (
     REGION_FILES,
     EdgeResults,
     edge_files,
+    encoded,
     find_edges,
     find_regions,
     region_files,
@@ -47,6 +49,10 @@ _EPILOGUES = {
     "lines": """examples:
   rangeedge lines depth.png -K 525,525,319.5,239.5 --out lines
   rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines""",
+    "explain": """examples:
+  rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233
+  rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233 --crease-threshold 20 --out why.png
+Give it the options that `detect` was given: then it says what `detect` did there, and which of them to change.""",
     "batch": """examples:
   rangeedge batch frames/*.png -K 525,525,319.5,239.5 --out edges --jobs 2
   rangeedge batch rgbd_dataset_freiburg1_desk --out edges --form png       # a sequence of the TUM RGB-D benchmark
@@ -69,15 +75,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(argv)
     run: Callable[[argparse.Namespace], int] = args.run
     try:
-        return run(args)
+        code = run(args)
+        sys.stdout.flush()
+        return code
     except error as problem:
         print(problem.msg, file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # the reader of the output has had enough, as in `rangeedge bench | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence()
         return 1
+    except OSError as problem:  # what is found was written, what is said about it could not be
+        _silence()
+        print(f"rangeedge: error: cannot write what is to be said: {problem.strerror or problem}", file=sys.stderr)
+        return 1
+
+
+def _silence() -> None:
+    """Nothing more goes to the standard output, not even what is still on its way."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -108,6 +125,15 @@ def _parser() -> argparse.ArgumentParser:
     _add_geometry(lines)
     _add_options(lines, "how lines are linked", Linking.options)
     _add_detector(lines)
+
+    explain = _command(commands, "explain", _explain, "say why a pixel is an edge, or why it is none")
+    explain.add_argument("image", metavar="IMAGE", help=_INPUT)
+    explain.add_argument("--at", required=True, type=_reader(_pixel), metavar="X,Y", help="the pixel: column, row")
+    explain.add_argument(
+        "--out", type=Path, default=None, metavar="FILE", help="a picture of the scan lines through it"
+    )
+    _add_geometry(explain)
+    _add_detector(explain)
 
     batch = _command(commands, "batch", _batch, "find the edges, regions or lines of many range images")
     add_batch_arguments(batch)
@@ -150,6 +176,7 @@ _USAGES = {
     "detect": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "segment": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "lines": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
+    "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
     "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
     "demo": "[--real] [options] --out DIR",
     "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
@@ -233,6 +260,14 @@ def _chosen(option: Option, word: str) -> int:
     return option.choices[word]
 
 
+def _pixel(text: str) -> tuple[int, int]:
+    """Column and row."""
+    words = text.replace(",", " ").split()
+    if len(words) != 2 or not all(word.isdecimal() for word in words):
+        raise ValueError(f"must be two whole numbers, column and row, got {text!r}")
+    return int(words[0]), int(words[1])
+
+
 def _mask(text: str) -> np.ndarray:
     try:
         picture = cv2.imdecode(np.fromfile(text, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -243,7 +278,7 @@ def _mask(text: str) -> np.ndarray:
     return picture
 
 
-_NOT_OPTIONS = {"run", "image", "out", "real", "repeat", "json", *BATCH_ARGUMENTS}
+_NOT_OPTIONS = {"run", "image", "out", "real", "repeat", "json", "at", *BATCH_ARGUMENTS}
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
@@ -278,6 +313,19 @@ def _lines(args: argparse.Namespace) -> int:
     write_folder(args.out, line_files(image, chains, found, args.image, options))
     print(f"{args.image}: {len(chains)} chains, {len(found.segments)} segments, {len(found.vertices)} vertices")
     _say_written(args.out, LINE_FILES)
+    return 0
+
+
+@named("explain")
+def _explain(args: argparse.Namespace) -> int:
+    from ..draw import drawExplanation
+    from ..explain import explainPixel
+
+    image = read_image(args.image, _options(args))
+    why = explainPixel(image.src, *args.at, **image.geometry)
+    if args.out is not None:
+        write_atomically(args.out, encoded(".png", drawExplanation(why)))
+    print(why)
     return 0
 
 

@@ -93,6 +93,7 @@ def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, limit: int) -> np
 # What an array in an NPZ file stands for.
 _GEOMETRY: dict[str, Callable[[np.ndarray], Any]] = {
     "K": lambda value: np.array(value, dtype=np.float64),
+    "distCoeffs": lambda value: np.array(value, dtype=np.float64),
     "pixelSize": lambda value: tuple(np.broadcast_to(value.astype(np.float64), 2).tolist()),
     "heightMap": lambda value: bool(value.item()),
     "depthFactor": lambda value: float(value.item()),

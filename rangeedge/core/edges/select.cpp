@@ -6,6 +6,7 @@
 #include <numeric>
 #include <vector>
 
+#include "base/watch.hpp"
 #include "image/components.hpp"
 
 namespace rangeedge {
@@ -13,9 +14,16 @@ namespace {
 
 constexpr double usual_length = 10;  // of the line whose significance is that of its pixels
 
+// In how many columns a component has pixels.
+int columns_of(const Components& parts, int i, int cols) {
+    std::vector<char> seen(static_cast<std::size_t>(cols), 0);
+    for (const auto [begin, end] : parts.runs(i)) std::fill_n(seen.begin() + parts.col_of(begin), end - begin, 1);
+    return static_cast<int>(std::count(seen.begin(), seen.end(), 1));
+}
+
 }  // namespace
 
-void keep_lines(const std::uint8_t* edges, int rows, int cols, int min_length, const float* significance,
+void keep_lines(const std::uint8_t* edges, int rows, int cols, bool wrap, int min_length, const float* significance,
                 double least_significance, std::uint8_t* kept) {
     const auto stride = static_cast<std::size_t>(cols) + 2, width = static_cast<std::size_t>(cols);
     std::vector<std::uint8_t> image(stride * (static_cast<std::size_t>(rows) + 2), 0);
@@ -23,8 +31,10 @@ void keep_lines(const std::uint8_t* edges, int rows, int cols, int min_length, c
         for (std::size_t col = 0; col < width; ++col)
             image[(row + 1) * stride + col + 1] = edges[row * width + col] != 0;
     std::fill_n(kept, static_cast<std::size_t>(rows) * width, std::uint8_t{0});
-    const Components parts(image.data(), rows, cols, 8);
+    const Components parts(image.data(), rows, cols, 8, wrap);
+    Checkpoints checkpoints;
     for (int i = 0; i < parts.count(); ++i) {
+        checkpoints.pass();
         int left = cols, right = -1, top = rows, bottom = -1;
         double squares = 0, pixels = 0;
         for (const auto [begin, end] : parts.runs(i)) {
@@ -36,7 +46,8 @@ void keep_lines(const std::uint8_t* edges, int rows, int cols, int min_length, c
             squares = std::inner_product(first, first + (end - begin), first, squares);
             pixels += static_cast<double>(end - begin);
         }
-        const int length = std::max(right - left, bottom - top) + 1;
+        const int wide = wrap ? columns_of(parts, i, cols) : right - left + 1;
+        const int length = std::max(wide, bottom - top + 1);
         if (length < min_length) continue;
         if (significance && !(squares * length >= least_significance * least_significance * usual_length * pixels))
             continue;

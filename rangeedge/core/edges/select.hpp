@@ -9,8 +9,9 @@ namespace rangeedge {
 
 // `kept` becomes 1 on the 8-connected components of `edges` whose bounding box has a side of at least `min_length`
 // pixels and whose `significance` (null: any) is at least `least_significance`, else 0. That of a line is the root mean
-// square of its pixels', times the root of its length in units of 10 pixels.
-void keep_lines(const std::uint8_t* edges, int rows, int cols, int min_length, const float* significance,
+// square of its pixels', times the root of its length in units of 10 pixels. `wrap` says that the first column follows
+// the last.
+void keep_lines(const std::uint8_t* edges, int rows, int cols, bool wrap, int min_length, const float* significance,
                 double least_significance, std::uint8_t* kept);
 
 }  // namespace rangeedge
