@@ -24,7 +24,8 @@ PUBLIC = """
     estimateNoise ScanLineParams splitScanLine EdgeStrength edgeStrength edgePoints kindNames flyingPixels
     strengthImage overallStrength selectEdges thinEdges detectEdges detectEdgesWithStrength ScanLineDetector
     Explanation explainPixel
-    createScanLineDetector mapFrames EdgeChain EdgeChains linkEdges Segments fitSegments writeLines closeContours
+    createScanLineDetector mapFrames EdgeChain EdgeChains linkEdges Segments fitSegments
+    Line toLines writeLines readLines closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
     extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats
     RegionBoundary RegionBoundaries regionBoundaries regionAdjacency cleanDepth
