@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ._check import error
-from .adjacency import regionAdjacency
+from .adjacency import regionAdjacency, regionCorners
 from .boundaries import RegionBoundaries, RegionBoundary, regionBoundaries
 from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
@@ -140,6 +140,7 @@ __all__ = [  # noqa: RUF022
     "RegionBoundaries",
     "regionBoundaries",
     "regionAdjacency",
+    "regionCorners",
     "cleanDepth",
     "drawEdges",
     "drawChains",

@@ -28,7 +28,7 @@ PUBLIC = """
     Line toLines writeLines readLines closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
     extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats
-    RegionBoundary RegionBoundaries regionBoundaries regionAdjacency cleanDepth
+    RegionBoundary RegionBoundaries regionBoundaries regionAdjacency regionCorners cleanDepth
     drawEdges drawChains drawSegments drawRegions drawBoundaries colorizeDistance drawOverview drawPanels
     drawExplanation
     DIR_ROWS DIR_COLS DIR_DIAG45 DIR_DIAG135 DIR_ALL FIT_LSQ FIT_INTERP MEASURE_MIDPOINT MEASURE_ENDPOINT
