@@ -52,6 +52,11 @@ class EdgeStrength(NamedTuple):
             parts.append(f"{name} at {values.size}{extent}")
         return f"EdgeStrength({'; '.join(parts)})"
 
+    def _repr_png_(self) -> bytes:
+        from .draw.shown import of_strength
+
+        return of_strength(self)
+
 
 @public
 def kindNames(kind: int) -> str:

@@ -25,7 +25,7 @@ constexpr int tangent_reach = 3;  // pixels
 constexpr double reach_per_radius = 0.5;
 constexpr std::ptrdiff_t most_frayed = 6, fray_reach = 16;  // positions at an end, and inside of them
 constexpr std::ptrdiff_t least_share_inside = 5;
-constexpr double least_fray = 0.8, fray_deviations = 3;     // pixels; standard deviations
+constexpr double least_fray = 0.8, fray_deviations = 3;  // pixels; standard deviations
 
 struct Sample {
     const Candidate* candidate;
