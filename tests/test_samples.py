@@ -25,7 +25,7 @@ PICTURES = {
     "pipeline": ["candidates.png"],
     "box_dimensions": ["box_dimensions.png"],
 }
-OTHERS = {"calibration", "camera", "common", "elevation", "paper", "scan_line", "scores", "tune"}
+OTHERS = {"calibration", "camera", "elevation", "paper", "scan_line", "scores", "tune"}
 
 
 @pytest.fixture(autouse=True)
