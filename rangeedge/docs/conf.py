@@ -18,7 +18,7 @@ extensions = ["sphinx.ext.autodoc", "sphinx.ext.mathjax", "numpydoc", "myst_nb",
 exclude_patterns = ["gallery/*.ipynb", "gallery/*.py", "gallery/*.json", "gallery/*.zip"]
 html_theme = "furo"
 html_title = "rangeedge"
-html_show_sourcelink = False
+html_show_sourcelink = html_show_copyright = False
 default_role = "code"
 myst_enable_extensions = ["dollarmath"]
 nb_execution_mode = "force"
@@ -45,8 +45,7 @@ class WrittenPictures:
 
 def arguments(gallery_conf, script_vars):
     """Of every sample: where to write."""
-    names = ("scores",)  # which writes nothing
-    return [] if Path(script_vars["src_file"]).stem in names else ["--out", str(PICTURES)]
+    return ["--out", str(PICTURES)]
 
 
 sphinx_gallery_conf = {
