@@ -139,6 +139,11 @@ class EdgeChains(Sequence["EdgeChain"]):
         count = ", ".join(f"{kinds.count(name)} {name}" for name in sorted(set(kinds)))
         return f"<{len(self)} edge chains of {len(self.points)} points{f': {count}' if count else ''}>"
 
+    def _repr_png_(self) -> bytes:
+        from .draw.shown import of_chains
+
+        return of_chains(self)
+
 
 @takes(LINKING)
 def linkEdges(

@@ -46,6 +46,11 @@ class Segments(NamedTuple):
     def __repr__(self) -> str:
         return f"<{len(self.segments)} segments, {len(self.vertices)} vertices>"
 
+    def _repr_png_(self) -> bytes:
+        from .draw.shown import of_segments
+
+        return of_segments(self)
+
 
 @public
 def fitSegments(
