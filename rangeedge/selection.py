@@ -336,7 +336,7 @@ def _connected_to(strong: np.ndarray, candidates: np.ndarray) -> np.ndarray:
 
 
 def _lines(edges: np.ndarray, minLength: int, significance: np.ndarray | None, lineSignificance: float) -> np.ndarray:
-    """The 8-connected components that are long and significant."""
+    """The lines that are significant, but for short pieces."""
     kept = np.empty(edges.shape, np.uint8)
     _core.keep_lines(edges.view(np.uint8), minLength, significance, lineSignificance, kept)
     return kept.view(bool)

@@ -229,12 +229,13 @@ class Detector:
             shift=sample - (left.last + right.first) / 2,
             jump=jump,
             crease=crease,
-            significance=max(jump_significance, crease_significance),
+            significance=crease_significance if crease > 0 else jump_significance,
             kind=kind,
             direction=line.direction,
             place=place,
             along=along / unit,
             sides=[(value, slope / unit, variance / unit**2) for value, slope, variance in sides],
+            spread=noise.of_jump("value") / (abs(mf - mg) * step) if meets and mf != mg else math.inf,
         )
 
 

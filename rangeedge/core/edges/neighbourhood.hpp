@@ -44,8 +44,6 @@ public:
     void for_each(Visit&& visit) const {
         for (std::size_t k = 0; k < order_.size(); ++k) visit(static_cast<std::size_t>(order_[k]), k);
     }
-    // From now on the candidate at place k is nobody's neighbour.
-    void remove(std::size_t k) { kinds_[k] = 0; }
 
     // A candidate and the places, in three rows of cells, where its neighbours are.
     struct Near {

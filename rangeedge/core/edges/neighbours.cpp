@@ -15,6 +15,7 @@ namespace {
 constexpr float largest_share = 8;      // standard deviations: at most so much evidence is a single candidate
 constexpr float lone_share = 1 / 3.0f;  // of its significance, is what a candidate without neighbours is worth
 constexpr int evidence_field = first_field;
+constexpr int alignments = 2;  // the second time, with neighbours that are in line already
 
 // The weighted sum of squared significances.
 template <int bytes>
@@ -36,7 +37,6 @@ void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, 
     const auto least = static_cast<float>(options.min_significance);
     const bool aligned = options.max_shift > 0;
     if (!(least > 0 || aligned || options.normals)) return;
-    const auto weak = [&](const Candidate& c) { return c.significance < least; };
     {
         NeighbourGrid grid(candidates, frame.rows, frame.cols, evidence_field + 1);
         grid.for_each([&](std::size_t i, std::size_t k) {
@@ -47,16 +47,15 @@ void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, 
             Candidate& c = candidates[i];
             c.significance = std::max(std::sqrt(evidence(near)), c.significance * lone_share);
         });
-        if (aligned) {
-            grid.for_each([&](std::size_t i, std::size_t k) {
-                if (weak(candidates[i])) grid.remove(k);
-            });
-            grid.for_each_near(team, [&](std::size_t i, const NeighbourGrid::Near& near) {
-                if (!weak(candidates[i])) align(candidates[i], near, frame, options.max_shift);
-            });
-        }
     }
+    const auto weak = [&](const Candidate& c) { return c.significance < least; };
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), weak), candidates.end());
+    for (int i = 0; i < (aligned ? alignments : 0); ++i) {
+        const NeighbourGrid grid(candidates, frame.rows, frame.cols, first_field);
+        grid.for_each_near(team, [&](std::size_t k, const NeighbourGrid::Near& near) {
+            align(candidates[k], near, frame, options.max_shift);
+        });
+    }
     if (!options.normals) return;
     const NeighbourGrid tangents = tangent_grid(candidates, frame.rows, frame.cols);
     tangents.for_each_near(team, [&](std::size_t i, const NeighbourGrid::Near& near) {
