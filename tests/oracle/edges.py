@@ -224,6 +224,7 @@ class Detector:
         place, along = (np.array(p) for p in line.place(x))
         sides = [(yf, mf, f.slope("slope") ** 2), (yg, mg, g.slope("slope") ** 2)]
         unit = float(np.hypot(*along))
+        spread = noise.of_jump("value") / (abs(mf - mg) * step) if mf != mg else math.inf
         return Candidate(
             **_at(line, before, after, sample),
             shift=sample - (left.last + right.first) / 2,
@@ -235,7 +236,7 @@ class Detector:
             place=place,
             along=along / unit,
             sides=[(value, slope / unit, variance / unit**2) for value, slope, variance in sides],
-            spread=noise.of_jump("value") / (abs(mf - mg) * step) if meets and mf != mg else math.inf,
+            spread=spread,
         )
 
 

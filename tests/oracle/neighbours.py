@@ -20,7 +20,7 @@ from rangeedge import (
 from .lines import SMALLEST, STEPS, Image
 
 REACH, CAPPED, LONE_SHARE = 4.0, 8.0, 1 / 3  # pixels; standard deviations
-ALIGNMENTS, MOST_SPREADS = 2, 4
+MOST_SPREADS = math.inf, 4  # of the first alignment and the second one
 LEAST_SLOPE = 0.3
 LEAST_SPREAD, LEAST_DIRECTIONS = 0.05, (0.02, 1e-9)
 
@@ -57,8 +57,8 @@ class Neighbourhood:
             return self.found
         joint = [replace(c, significance=self._joint_significance(c)) for c in self.found]
         kept = Neighbourhood([c for c in joint if c.significance >= params.minSignificance], self.image)
-        for _ in range(ALIGNMENTS):
-            kept = Neighbourhood([kept._aligned(c) for c in kept.found], self.image)
+        for spreads in MOST_SPREADS:
+            kept = Neighbourhood([kept._aligned(c, spreads) for c in kept.found], self.image)
         return kept._with_normals() if params.crease == CREASE_NORMAL else kept.found
 
     def _common_line(self, c, share=1.0):
@@ -73,7 +73,7 @@ class Neighbourhood:
         across = np.linalg.eigh(spread)[1][:, 0]
         return across, float(across @ mean)
 
-    def _aligned(self, c):
+    def _aligned(self, c, spreads):
         """A crease moved along its scan line onto the line it has in common with its neighbours."""
         line = self._common_line(c) if c.crease > 0 and not c.kind & EDGE_JUMP else None
         if line is None:
@@ -84,7 +84,7 @@ class Neighbourhood:
         if abs(slope) < LEAST_SLOPE:
             return c
         shift = distance / slope
-        if abs(c.shift + shift) > self.image.params.maxShift or abs(shift) > MOST_SPREADS * c.spread:
+        if abs(c.shift + shift) > self.image.params.maxShift or abs(shift) > spreads * c.spread:
             return c
         x, y = c.x + shift * dx, c.y + shift * dy
         u = math.floor(x) if dx else round(x)

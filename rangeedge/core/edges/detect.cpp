@@ -154,7 +154,7 @@ private:
         if (crease > 0) c.kind |= is_convex(f1, f2) ? convex_bit : concave_bit;
         locate(c, line, edge);
         const double bend = std::abs(f1.slope - f2.slope) * step;
-        c.spread = edge.intersects ? within_range(of_jump.single / bend) : endless;
+        c.spread = within_range(of_jump.single / bend);
         c.sides[0] = side(line, x, f1, slope1.single);
         c.sides[1] = side(line, x, f2, slope2.single);
         return c;

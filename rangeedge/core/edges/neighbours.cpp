@@ -15,7 +15,9 @@ namespace {
 constexpr float largest_share = 8;      // standard deviations: at most so much evidence is a single candidate
 constexpr float lone_share = 1 / 3.0f;  // of its significance, is what a candidate without neighbours is worth
 constexpr int evidence_field = first_field;
-constexpr int alignments = 2;  // the second time, with neighbours that are in line already
+// Standard deviations by which creases move at the most when they are aligned, and then again, with neighbours that are
+// in line already: only as far as the noise explains it.
+constexpr double alignments[] = {HUGE_VAL, 4};
 
 // The weighted sum of squared significances.
 template <int bytes>
@@ -50,10 +52,11 @@ void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, 
     }
     const auto weak = [&](const Candidate& c) { return c.significance < least; };
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), weak), candidates.end());
-    for (int i = 0; i < (aligned ? alignments : 0); ++i) {
+    for (const double max_spreads : alignments) {
+        if (!aligned) break;
         const NeighbourGrid grid(candidates, frame.rows, frame.cols, first_field);
         grid.for_each_near(team, [&](std::size_t k, const NeighbourGrid::Near& near) {
-            align(candidates[k], near, frame, options.max_shift);
+            align(candidates[k], near, frame, options.max_shift, max_spreads);
         });
     }
     if (!options.normals) return;
