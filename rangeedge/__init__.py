@@ -7,9 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 from ._check import error
 from .adjacency import regionAdjacency
+from .boundaries import RegionBoundaries, RegionBoundary, regionBoundaries
+from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
+from .cleaning import cleanDepth
 from .closure import closeContours
 from .constants import (
+    CLEAN_FILLED,
+    CLEAN_REMOVED,
+    CLEAN_SMOOTHED,
     CREASE_MAX,
     CREASE_NORMAL,
     DIR_ALL,
@@ -41,10 +47,21 @@ from .distance import (
     salienceDistanceTransform,
     salienceDistanceTransformWithLabels,
 )
-from .draw import colorizeDistance, drawEdges, drawOverview, drawRegions
-from .draw_lines import drawChains, drawSegments
+from .draw import (
+    colorizeDistance,
+    drawBoundaries,
+    drawChains,
+    drawEdges,
+    drawExplanation,
+    drawOverview,
+    drawPanels,
+    drawRegions,
+    drawSegments,
+)
 from .edges import EdgeStrength, edgePoints, edgeStrength, kindNames, splitScanLine
+from .explain import Explanation, explainPixel
 from .flying import flyingPixels
+from .frames import mapFrames
 from .io import RangeImage, imreadRange, imwriteRange
 from .io.lines import writeLines
 from .noise import estimateNoise
@@ -71,6 +88,7 @@ __version__ = "0.1.0"
 __all__ = [  # noqa: RUF022
     "error",
     "RangeEdgeWarning",
+    "Cancellation",
     "RangeImage",
     "imreadRange",
     "imwriteRange",
@@ -92,8 +110,11 @@ __all__ = [  # noqa: RUF022
     "thinEdges",
     "detectEdges",
     "detectEdgesWithStrength",
+    "Explanation",
+    "explainPixel",
     "ScanLineDetector",
     "createScanLineDetector",
+    "mapFrames",
     "EdgeChain",
     "EdgeChains",
     "linkEdges",
@@ -111,13 +132,20 @@ __all__ = [  # noqa: RUF022
     "growRegionsWithStats",
     "segmentRegions",
     "segmentRegionsWithStats",
+    "RegionBoundary",
+    "RegionBoundaries",
+    "regionBoundaries",
     "regionAdjacency",
+    "cleanDepth",
     "drawEdges",
     "drawChains",
     "drawSegments",
     "drawRegions",
+    "drawBoundaries",
     "colorizeDistance",
     "drawOverview",
+    "drawPanels",
+    "drawExplanation",
     "DIR_ROWS",
     "DIR_COLS",
     "DIR_DIAG45",
@@ -135,6 +163,9 @@ __all__ = [  # noqa: RUF022
     "EDGE_OCCLUDING",
     "EDGE_OCCLUDED",
     "EDGE_BOUNDARY",
+    "CLEAN_SMOOTHED",
+    "CLEAN_REMOVED",
+    "CLEAN_FILLED",
     "THIN_SKELETON",
     "THIN_LEE",
     "THIN_ITERATIVE",

@@ -72,7 +72,10 @@ def described(value: Any) -> str:
     """An argument in a few words: arrays by dtype and shape, everything else as it prints."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype} array of shape {value.shape}"
-    text = repr(value)
+    try:
+        text = repr(value)
+    except Exception:  # of a class of the user's, or an integer of thousands of digits
+        return f"a {type(value).__name__}"
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
@@ -135,10 +138,18 @@ def number(name: str, value: Any, low: float = -np.inf, high: float = np.inf, *,
     expected = f"a finite number {bound}".rstrip()
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise fail(name, expected, described(value))
-    value = float(value)
-    if not np.isfinite(value) or value < low or value > high or (above and value == low):
+    number = real(value)
+    if not np.isfinite(number) or number < low or number > high or (above and number == low):
         raise fail(name, expected, described(value), cv2.Error.StsOutOfRange)
-    return value
+    return number
+
+
+def real(value: float | np.integer | np.floating) -> float:
+    """A number in double precision; infinite where it is beyond that."""
+    try:
+        return float(value)
+    except OverflowError:
+        return np.inf if value > 0 else -np.inf
 
 
 def integer(name: str, value: Any, low: int, high: int = 2**31 - 1) -> int:
@@ -171,7 +182,7 @@ def camera_matrix(name: str, value: Any) -> np.ndarray:
 
     try:
         return matrix_of(value)
-    except (TypeError, ValueError) as reason:
+    except (TypeError, ValueError, OverflowError) as reason:
         expected = "a camera: (fx, fy, cx, cy), 9 numbers, 3x3, 3x4, or the name of a file of one"
         raise fail(name, expected, f"{described(value)} ({reason})") from None
 
@@ -192,7 +203,7 @@ def distortion(name: str, value: Any) -> np.ndarray:
     expected = "4, 5, 8, 12 or 14 finite numbers"
     try:
         coefficients = np.array(value, dtype=np.float64).ravel()
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise fail(name, expected, described(value)) from None
     if len(coefficients) not in (4, 5, 8, 12, 14) or not np.isfinite(coefficients).all():
         raise fail(name, expected, described(value))
@@ -220,7 +231,7 @@ def invalid_values(name: str, value: Any) -> tuple[tuple[float, float], ...]:
                 raise fail(name, "a number, or a sequence of numbers and of pairs (low, high)", described(value))
         if low > high:
             raise fail(name, "low <= high in every pair", described(item), cv2.Error.StsOutOfRange)
-        ranges.append((float(low), float(high)))
+        ranges.append((real(low), real(high)))
     return tuple(ranges)
 
 
@@ -233,6 +244,15 @@ def pixel_size(name: str, value: Any) -> tuple[float, float]:
         raise fail(name, "a length or a pair (dx, dy)", described(value), cv2.Error.StsBadSize)
     dx, dy = (number(name, h, 0, above=True) for h in value)
     return dx, dy
+
+
+def image_size(name: str, value: Any) -> tuple[int, int]:
+    """Width and height of an image."""
+    value = value.tolist() if isinstance(value, np.ndarray) else value
+    if not isinstance(value, (tuple, list)) or len(value) != 2:
+        raise fail(name, "a width and a height in pixels", described(value), cv2.Error.StsBadSize)
+    width, height = (integer(name, side, 1) for side in value)
+    return width, height
 
 
 def deliver(name: str, result: np.ndarray, dst: np.ndarray | None) -> np.ndarray:

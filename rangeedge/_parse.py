@@ -51,6 +51,14 @@ def pixel_size(text: str) -> float | tuple[float, ...]:
     return numbers[0] if len(numbers) == 1 else tuple(numbers)
 
 
+def image_size(text: str) -> list[int]:
+    """Width and height as 640,480 or 640x480."""
+    width, height = _numbers(text.lower().replace("x", ","), (2,), "a width and a height, 640,480")
+    if width != int(width) or height != int(height):
+        raise ValueError(f"must be whole numbers, got {text!r}")
+    return [int(width), int(height)]
+
+
 def noise(text: str) -> float | NoiseModel:
     if text in SENSORS:
         return SENSORS[text]()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 import cv2
 import numpy as np
 
-from ._check import error, fail
+from ._check import described, error, fail
 from .io.atomic import write_atomically
 from .noise_model import NoiseModel
 from .options import DETECTION
@@ -65,6 +66,8 @@ def load(filename: str | os.PathLike[str], node: str) -> tuple[str, dict[str, An
 
 def write(fs: cv2.FileStorage, node: str, values: Mapping[str, Any]) -> None:
     """Write values into a storage, under a node where that has a name."""
+    if not isinstance(node, str) or (node and not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_ -]*", node)):
+        raise fail("name", "letters, digits, '_', '-' and ' ', a letter first", described(node))
     if node:
         fs.startWriteStruct(node, cv2.FileNode_MAP)
     for name, value in values.items():

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 class GeometryOptions(TypedDict, total=False):
     K: ArrayLike | str | os.PathLike[str] | None
     distCoeffs: ArrayLike | None
+    imageSize: Sequence[int] | None
     pixelSize: float | Sequence[float] | None
     heightMap: bool
     depthFactor: float
@@ -29,6 +30,7 @@ class ScanLineOptions(TypedDict, total=False):
     epsFactor: float
     K: ArrayLike | str | os.PathLike[str] | None
     distCoeffs: ArrayLike | None
+    imageSize: Sequence[int] | None
     pixelSize: float | Sequence[float] | None
     heightMap: bool
     depthFactor: float
@@ -63,6 +65,7 @@ class SeedingOptions(TypedDict, total=False):
 class GrowingOptions(TypedDict, total=False):
     K: ArrayLike | str | os.PathLike[str] | None
     distCoeffs: ArrayLike | None
+    imageSize: Sequence[int] | None
     pixelSize: float | Sequence[float] | None
     heightMap: bool
     depthFactor: float
@@ -77,6 +80,7 @@ class GrowingOptions(TypedDict, total=False):
 class SegmentingOptions(TypedDict, total=False):
     K: ArrayLike | str | os.PathLike[str] | None
     distCoeffs: ArrayLike | None
+    imageSize: Sequence[int] | None
     pixelSize: float | Sequence[float] | None
     heightMap: bool
     depthFactor: float
@@ -93,6 +97,7 @@ class SegmentingOptions(TypedDict, total=False):
 class ClosingOptions(TypedDict, total=False):
     K: ArrayLike | str | os.PathLike[str] | None
     distCoeffs: ArrayLike | None
+    imageSize: Sequence[int] | None
     pixelSize: float | Sequence[float] | None
     heightMap: bool
     depthFactor: float
@@ -103,6 +108,21 @@ class ClosingOptions(TypedDict, total=False):
     share: float
     maxGap: int
     minArea: int
+
+
+class CleaningOptions(TypedDict, total=False):
+    K: ArrayLike | str | os.PathLike[str] | None
+    distCoeffs: ArrayLike | None
+    imageSize: Sequence[int] | None
+    pixelSize: float | Sequence[float] | None
+    heightMap: bool
+    depthFactor: float
+    invalid: float | Sequence[float | Sequence[float]] | None
+    origin: Sequence[float] | None
+    noise: NoiseModel | float | np.ndarray | None
+    maxHole: int
+    radius: float
+    removeFlying: bool
 
 
 class JoiningOptions(TypedDict, total=False):
@@ -163,7 +183,7 @@ class Accessors:
 
         Camera; the values of `src` are then depths along the optical axis. (fx, fy, cx, cy), 3x3, 3x4, 9 numbers by
         rows, or the name of a file of one (YAML, JSON or XML of cv2, ROS, Open3D or librealsense, text, NPY, NPZ),
-        whose distortion replaces `distCoeffs`.
+        whose distortion replaces `distCoeffs`, and whose image size `src` must have.
         """
         return self._params.K  # type: ignore[return-value]
 
@@ -172,7 +192,7 @@ class Accessors:
 
         Camera; the values of `src` are then depths along the optical axis. (fx, fy, cx, cy), 3x3, 3x4, 9 numbers by
         rows, or the name of a file of one (YAML, JSON or XML of cv2, ROS, Open3D or librealsense, text, NPY, NPZ),
-        whose distortion replaces `distCoeffs`.
+        whose distortion replaces `distCoeffs`, and whose image size `src` must have.
         """
         self._set("K", K)
 
@@ -189,6 +209,22 @@ class Accessors:
         Distortion of the lens with `K`, as cv2 has it: (k1, k2, p1, p2[, k3[, k4, k5, k6[, ...]]]).
         """
         self._set("distCoeffs", distCoeffs)
+
+    def getImageSize(self) -> tuple[int, int] | None:
+        """getImageSize() -> retval
+
+        Width and height of the images that `K` holds for: others, resized or cropped, are refused. None: that of the
+        camera's file, where it tells one.
+        """
+        return self._params.imageSize  # type: ignore[return-value]
+
+    def setImageSize(self, imageSize: Sequence[int] | None, /) -> None:
+        """setImageSize(imageSize) -> None
+
+        Width and height of the images that `K` holds for: others, resized or cropped, are refused. None: that of the
+        camera's file, where it tells one.
+        """
+        self._set("imageSize", imageSize)
 
     def getPixelSize(self) -> tuple[float, float] | None:
         """getPixelSize() -> retval

@@ -100,7 +100,7 @@ def regionAdjacency(
     labels = np.where(frame.valid > 0, np.maximum(labels32s("labels", labels, frame.shape), 0), 0)
     gap = integer("gap", gap, 0, 64)
     minContacts = integer("minContacts", minContacts, 1)
-    i, j = _contacts(labels, gap)
+    i, j = _contacts(labels, gap, frame.seam)
     if not len(i):
         return np.zeros(0, PAIR)
     surfaces = surfaces_of(frame, labels, int(labels.max()) + 1)
@@ -113,17 +113,23 @@ def regionAdjacency(
     return np.array(found, PAIR)
 
 
-def _contacts(labels: np.ndarray, gap: int) -> tuple[np.ndarray, np.ndarray]:
+def _contacts(labels: np.ndarray, gap: int, seam: int | None) -> tuple[np.ndarray, np.ndarray]:
     """Indices of the pixels of every contact, that with the lower label first."""
     index = np.arange(labels.size).reshape(labels.shape)
     pairs = []
-    for numbers, named in ((index, labels), (index.T, labels.T)):
+    for numbers, named, wrap in ((index, labels, seam == 1), (index.T, labels.T, seam == 0)):
+        width = named.shape[1]
+        if wrap:
+            numbers, named = (np.concatenate([a, a[:, : gap + 1]], axis=1) for a in (numbers, named))
         for distance in range(1, min(gap + 1, named.shape[1] - 1) + 1):
-            a, b = named[:, :-distance], named[:, distance:]
+            a = named[:, :-distance][:, :width]
+            b = named[:, distance : distance + a.shape[1]]
             touching = (a > 0) & (b > 0) & (a != b)
             for k in range(1, distance):
                 touching &= named[:, k : k + a.shape[1]] == 0
-            pairs.append(np.stack([numbers[:, :-distance][touching], numbers[:, distance:][touching]]))
+            pairs.append(
+                np.stack([numbers[:, : a.shape[1]][touching], numbers[:, distance : distance + a.shape[1]][touching]])
+            )
     i, j = np.concatenate(pairs, axis=1) if pairs else np.zeros((2, 0), int)
     flat = labels.ravel()
     swap = flat[i] > flat[j]
@@ -175,30 +181,37 @@ def _planes(surface: np.void, points: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def _sights(frame: Frame, points: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Where lines of sight pass the plane of the image, in the axes of the points."""
-    axis = frame.axes[2]
-    along = points[pixels] @ axis
-    return points[pixels] / along[:, None] if frame.projective else points[pixels] - along[:, None] * axis
+    """Where lines of sight pass the plane of the image, or the unit sphere, in the axes of the points."""
+    along = _along(frame, points[pixels])[:, None]
+    return (points[pixels] - frame.origin) / along if frame.projective else points[pixels] - along * frame.axes[2]
+
+
+def _along(frame: Frame, points: np.ndarray) -> np.ndarray:
+    """The depths of points."""
+    from_viewpoint = points - frame.origin
+    return np.linalg.norm(from_viewpoint, axis=1) if frame.ranges else from_viewpoint @ frame.axes[2]
 
 
 def _depth(frame: Frame, on: np.ndarray, normal: np.ndarray, sights: np.ndarray) -> np.ndarray:
     """Of planes along lines of sight."""
-    axis = frame.axes[2]
-    ways = sights if frame.projective else np.broadcast_to(axis, sights.shape)
-    origins = np.zeros_like(sights) if frame.projective else sights
+    ways = sights if frame.projective else np.broadcast_to(frame.axes[2], sights.shape)
+    origins = np.asarray(frame.origin) if frame.projective else sights
     with np.errstate(divide="ignore", invalid="ignore"):
         return ((on - origins) * normal).sum(axis=1) / (ways * normal).sum(axis=1)
 
 
 def _distance(frame: Frame, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    width = frame.shape[1]
-    return np.abs(i // width - j // width) + np.abs(i % width - j % width)
+    """Of pixels in the same row or column, around the seam where that is shorter."""
+    steps = np.abs(np.stack(np.unravel_index(i, frame.shape)) - np.stack(np.unravel_index(j, frame.shape)))
+    if frame.seam is not None:
+        steps[frame.seam] = np.minimum(steps[frame.seam], frame.shape[frame.seam] - steps[frame.seam])
+    return steps.sum(axis=0)
 
 
 def _sigma(frame: Frame, points: np.ndarray, pixels: np.ndarray) -> np.ndarray:
     if isinstance(frame.noise, np.ndarray):
         return frame.noise.ravel()[pixels]
-    return frame.noise(np.abs(points[pixels] @ frame.axes[2]))
+    return frame.noise(np.abs(_along(frame, points[pixels])))
 
 
 def _intersection(first: np.void, second: np.void, near: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:

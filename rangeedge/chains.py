@@ -10,12 +10,13 @@ import numpy as np
 from . import _core
 from ._option import parsed, takes
 from .constants import EDGE_JUMP
-from .edges import kernel_options, kindNames, no_strength
+from .detector import selected, thin_lines
+from .edges import EdgeStrength, kernel_options, kindNames, no_strength
 from .frame import Frame
 from .noise import measured_frame
 from .options import LINKING, Linking, ScanLineParams, Selection
-from .selection import select_strength
-from .thinning import thinEdges
+from .panorama import joined_chains
+from .sectors import sectors_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -136,6 +137,11 @@ class EdgeChains(Sequence["EdgeChain"]):
         count = ", ".join(f"{kinds.count(name)} {name}" for name in sorted(set(kinds)))
         return f"<{len(self)} edge chains of {len(self.points)} points{f': {count}' if count else ''}>"
 
+    def _repr_png_(self) -> bytes:
+        from .draw.shown import of_chains
+
+        return of_chains(self)
+
 
 @takes(LINKING)
 def linkEdges(
@@ -203,13 +209,37 @@ def linkEdges(
 
 def link_frame(frame: Frame, params: ScanLineParams, selection: Selection, linking: Linking) -> EdgeChains:
     """The chains of a checked range image."""
-    strength = no_strength(frame.shape)
-    kept = _core.keep_candidates(frame.kernel, kernel_options(frame, params), frame.threads, *strength)
-    thin = thinEdges(select_strength(strength, selection))
+    strength, parts, kept = no_strength(frame.shape), sectors_of(frame), []
+    for part in parts:
+        own = no_strength(part.frame.shape)
+        kept.append(_candidates(part.frame, params, own))
+        for whole, values in zip(strength, own, strict=True):
+            part.put(whole, values)
+    if not parts:
+        kept.append(_candidates(frame, params, strength))
+    thin = thin_lines(frame, selected(frame, strength, selection))
     options = _core.LinkOptions(bridge=linking.bridge, corner_angle=linking.cornerAngle, min_length=selection.minLength)
-    rows, headers = _core.link_edges(frame.kernel, kept, thin, strength.kind, options, frame.threads)
+    if not parts:
+        return EdgeChains(*_linked(frame, kept[0], thin, strength.kind, options))
+    found = []
+    for part, candidates in zip(parts, kept, strict=True):
+        found.append(_linked(part.frame, candidates, part.take(thin), part.take(strength.kind), options))
+    points, headers = joined_chains(frame, parts, found, selection.minLength)
+    around = np.where(np.arange(2) == 1 - frame.seam, frame.shape[frame.seam], 0) if frame.seam is not None else None
+    return EdgeChains(points, _chains(headers, points, around))
+
+
+def _candidates(frame: Frame, params: ScanLineParams, strength: EdgeStrength) -> _core.Candidates:
+    return _core.keep_candidates(frame.kernel, kernel_options(frame, params), frame.threads, *strength)
+
+
+def _linked(
+    frame: Frame, candidates: _core.Candidates, thin: np.ndarray, kinds: np.ndarray, options: _core.LinkOptions
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points and chains along the lines of a map."""
+    rows, headers = _core.link_edges(frame.kernel, candidates, thin, kinds, options, frame.threads)
     points = _points(frame, rows, np.repeat(headers[:, 2] == EDGE_JUMP, headers[:, 1]))
-    return EdgeChains(points, _chains(headers, points))
+    return points, _chains(headers, points)
 
 
 def _points(frame: Frame, rows: np.ndarray, jumps: np.ndarray) -> np.ndarray:
@@ -221,7 +251,8 @@ def _points(frame: Frame, rows: np.ndarray, jumps: np.ndarray) -> np.ndarray:
     points["point"] = _in_space(frame, plane, ordinates[:, 0])
     points["behind"] = _in_space(frame, plane, ordinates[:, 1])
     points["measured"] = _in_space(frame, rows[:, 11:13], rows[:, 13])
-    points["jump"] = np.where(jumps, np.abs((points["behind"] - points["point"]) @ axes[2]), 0)
+    through = points["behind"] - points["point"]
+    points["jump"] = np.where(jumps, np.linalg.norm(through, axis=1) if frame.ranges else np.abs(through @ axes[2]), 0)
     points["behind"][~jumps] = np.nan
     points["normals"] = _normals(frame, plane, ordinates, gradients) @ axes
     first, second = points["normals"][:, 0], points["normals"][:, 1]
@@ -234,7 +265,7 @@ def _points(frame: Frame, rows: np.ndarray, jumps: np.ndarray) -> np.ndarray:
 def _in_space(frame: Frame, plane: np.ndarray, ordinate: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         depth = 1 / ordinate if frame.projective else -ordinate
-    return np.column_stack([plane * depth[:, None] if frame.projective else plane, depth]) @ frame.axes
+    return np.column_stack([plane * depth[:, None] if frame.projective else plane, depth]) @ frame.axes + frame.origin
 
 
 def _normals(frame: Frame, plane: np.ndarray, ordinates: np.ndarray, gradients: np.ndarray) -> np.ndarray:
@@ -248,7 +279,8 @@ def _normals(frame: Frame, plane: np.ndarray, ordinates: np.ndarray, gradients: 
     return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
 
 
-def _chains(headers: np.ndarray, points: np.ndarray) -> np.ndarray:
+def _chains(headers: np.ndarray, points: np.ndarray, around: np.ndarray | None = None) -> np.ndarray:
+    """Of rows (first, count, kind, closed, straight). `around` are the lengths of axes that wrap, 0 for others."""
     chains = np.zeros(len(headers), CHAIN)
     for column, name in enumerate(("first", "count", "kind", "closed", "straight")):
         chains[name] = headers[:, column]
@@ -258,15 +290,17 @@ def _chains(headers: np.ndarray, points: np.ndarray) -> np.ndarray:
     for name in ("jump", "crease"):
         chains[name] = np.add.reduceat(points[name], first) / chains["count"]
     chains["significance"] = np.maximum.reduceat(points["significance"], first)
-    chains["pixels"] = _lengths(np.column_stack([points["x"], points["y"]]), chains)
+    chains["pixels"] = _lengths(np.column_stack([points["x"], points["y"]]), chains, around)
     chains["length"] = _lengths(points["point"], chains)
     return chains
 
 
-def _lengths(places: np.ndarray, chains: np.ndarray) -> np.ndarray:
+def _lengths(places: np.ndarray, chains: np.ndarray, around: np.ndarray | None = None) -> np.ndarray:
     """Of the way through the points of every chain."""
     first, last = chains["first"], chains["first"] + chains["count"] - 1
-    step = np.zeros(len(places))
-    step[:-1] = np.linalg.norm(np.diff(places, axis=0), axis=1)
-    step[last] = np.where(chains["closed"], np.linalg.norm(places[first] - places[last], axis=1), 0)
-    return np.add.reduceat(step, first)
+    following = np.arange(1, len(places) + 1)
+    following[last] = np.where(chains["closed"], first, last)
+    step = np.abs(places[following] - places)
+    if around is not None:
+        step = np.where(around > 0, np.minimum(step, np.abs(around - step)), step)
+    return np.add.reduceat(np.linalg.norm(step, axis=1), first)

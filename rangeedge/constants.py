@@ -27,6 +27,11 @@ EDGE_OCCLUDING = 8  # nearer side of a jump
 EDGE_OCCLUDED = 16  # farther side of a jump
 EDGE_BOUNDARY = 32  # valid pixel beside an invalid one
 
+# What `cleanDepth` has done to a pixel (bits).
+CLEAN_SMOOTHED = 1
+CLEAN_REMOVED = 2
+CLEAN_FILLED = 4
+
 # How an edge map is thinned.
 THIN_SKELETON = 0  # skeleton after Zhang and Suen
 THIN_LEE = 1  # skeleton after Lee, Kashyap and Chu

@@ -52,6 +52,11 @@ class EdgeStrength(NamedTuple):
             parts.append(f"{name} at {values.size}{extent}")
         return f"EdgeStrength({'; '.join(parts)})"
 
+    def _repr_png_(self) -> bytes:
+        from .draw.shown import of_strength
+
+        return of_strength(self)
+
 
 @public
 def kindNames(kind: int) -> str:
@@ -128,7 +133,7 @@ def splitScanLine(z: np.ndarray, eps: float, pixelSize: float | np.ndarray = 1.0
     z = array("z", z, "a real array of shape (N,)", ndim=(1,))
     eps = number("eps", eps, 0)
     y = _line(z, np.float64 if z.dtype.itemsize > 4 or z.dtype.kind != "f" else np.float32)
-    if np.ndim(pixelSize) == 0:
+    if not isinstance(pixelSize, np.ndarray):
         x = None
         number("pixelSize", pixelSize, 0, above=True)
     else:

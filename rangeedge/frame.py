@@ -15,6 +15,7 @@ from .forms import SRC, range_array
 from .noise_model import WHITE, NoiseModel
 from .options import ScanLineParams
 from .plausible import warn_of_dropped
+from .sectors import Turn, turn_of
 from .viewpoint import distorted_rays, view_of
 
 _THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
@@ -58,6 +59,16 @@ class Frame:
     def threads(self) -> int:
         """How many threads the image is worth."""
         return threads_worth(self.shape[0] * self.shape[1])
+
+    @cached_property
+    def turn(self) -> Turn | None:
+        """How far the image looks around, where that is too far for one axis of view."""
+        return turn_of(self.samples) if self.ranges else None
+
+    @property
+    def seam(self) -> int | None:
+        """The axis along which first and last line are neighbours: 1 where rows wrap; None where there is none."""
+        return self.turn.axis if self.turn and self.turn.closed else None
 
     @cached_property
     def ordinate(self) -> np.ndarray:
@@ -181,6 +192,10 @@ def checked(src: np.ndarray, params: ScanLineParams) -> tuple[np.ndarray, np.nda
         raise fail("heightMap", "False where K is given (its values are depths)", params.heightMap)
     if K is None and params.distCoeffs is not None:
         raise fail("distCoeffs", "None where K is not given", described(params.distCoeffs))
+    if K is None and params.imageSize is not None:
+        raise fail("imageSize", "None where K is not given", described(params.imageSize))
+    if params.imageSize is not None and params.imageSize != (src.shape[1], src.shape[0]):
+        raise _other_size(src.shape, params.imageSize)
     for name in ("K", "pixelSize") if points else ("origin",):
         if getattr(params, name) is not None:
             form = "points" if points else "no points"
@@ -188,6 +203,18 @@ def checked(src: np.ndarray, params: ScanLineParams) -> tuple[np.ndarray, np.nda
     if params.origin is not None and params.heightMap:
         raise fail("origin", "None where heightMap is given (its lines of sight are parallel)", params.origin)
     return src, seen
+
+
+def _other_size(shape: tuple[int, ...], size: tuple[int, int]) -> Exception:
+    """What to say of an image that K does not hold for."""
+    (width, height), (own_width, own_height) = size, (shape[1], shape[0])
+    x, y = own_width / width, own_height / height
+    return error(
+        f"`src` has {own_width} x {own_height} pixels, but K holds for {width} x {height}: where the image was resized,"
+        f" give (x fx, y fy, x (cx + 0.5) - 0.5, y (cy + 0.5) - 0.5) with x = {x:.6g} and y = {y:.6g}; where it was"
+        " cropped, subtract its first column and row from cx and cy; or say by imageSize what K holds for",
+        cv2.Error.StsUnmatchedSizes,
+    )
 
 
 def _holds(src: np.ndarray, ranges: tuple[tuple[float, float], ...]) -> np.ndarray:

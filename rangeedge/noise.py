@@ -37,6 +37,8 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
     medians exceed these by are the factors in `fits`, along rows and along columns; |D| by depth tells how the waves of
     the noise grow with it. Whoever detects edges with the model counts with that; its `correlation` sums it up.
 
+    A scanner that turns measures each of its pixels for itself: of its points the noise is white.
+
     Parameters
     ----------
     src : ndarray
@@ -89,4 +91,6 @@ def estimated(frame: Frame) -> NoiseModel:
     """The noise of a checked range image."""
     numbers = _core.estimate_noise(frame.ordinate, frame.projective, frame.step, frame.threads)
     (a, b, c, _), fits = numbers[:4], tuple(numbers[4:])
+    if frame.ranges:
+        return NoiseModel(a, b, c)
     return NoiseModel(a, b, c, max(1.0, correlation_of(fits)), fits=fits)

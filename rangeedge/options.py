@@ -121,6 +121,7 @@ class ScanLineParams(Options):
             camera = _check.camera_file("K", self.K)
             object.__setattr__(self, "K", camera.K)
             object.__setattr__(self, "distCoeffs", camera.distCoeffs)
+            object.__setattr__(self, "imageSize", self.imageSize or camera.size)
         super().__post_init__()
 
     eps: float | None = option(
@@ -144,7 +145,7 @@ class ScanLineParams(Options):
         "array_like or path or None",
         "Camera; the values of `src` are then depths along the optical axis. (fx, fy, cx, cy), 3x3, 3x4, 9 numbers by"
         " rows, or the name of a file of one (YAML, JSON or XML of cv2, ROS, Open3D or librealsense, text, NPY, NPZ),"
-        " whose distortion replaces `distCoeffs`.",
+        " whose distortion replaces `distCoeffs`, and whose image size `src` must have.",
         group="geometry",
         kept="np.ndarray | None",
         read=_parse.camera,
@@ -161,6 +162,18 @@ class ScanLineParams(Options):
         read=_parse.distortion,
         metavar="K1,K2,P1,P2[,...]",
         flagged="distortion of the lens, with -K, as cv2 has it (default: none, or that of the camera's file)",
+    )
+    imageSize: Sequence[int] | None = option(
+        None,
+        _or_none(_check.image_size),
+        "(int, int) or None",
+        "Width and height of the images that `K` holds for: others, resized or cropped, are refused. None: that of the"
+        " camera's file, where it tells one.",
+        group="geometry",
+        kept="tuple[int, int] | None",
+        read=_parse.image_size,
+        metavar="W,H",
+        flagged="size of the images that -K holds for, others are refused (default: that of the camera's file)",
     )
     pixelSize: float | Sequence[float] | None = option(
         None,
@@ -459,18 +472,49 @@ class Closing(Options):
         "Share of the pixels of a surface that must lie within `tolerance`, in (0, 1].",
     )
     maxGap: int = option(
-        40,
+        120,
         _whole(0),
         "int",
-        "Widest gap to close: edges are dilated by at most half of it.",
+        "Longest gap to close.",
         unit="pixels",
     )
     minArea: int = option(
         50,
         _whole(1),
         "int",
-        "Components of fewer pixels are no hypotheses; no edge is drawn for them.",
+        "Parts of fewer pixels are no surfaces; no edge is drawn around them.",
         unit="pixels",
+    )
+
+
+@declared
+@dataclass(frozen=True, eq=False, repr=False)
+class Cleaning(Options):
+    """What is done to depths."""
+
+    maxHole: int = option(
+        24,
+        _whole(0),
+        "int",
+        "Widest hole to fill: where a disc of this diameter without data fits in, the hole stays; 0 fills none.",
+        unit="pixels",
+        group="cleaning",
+    )
+    radius: float = option(
+        6.0,
+        _real(0, 100),
+        "float",
+        "Standard deviation of the weights with which noise is averaged over a surface, from 0, which leaves it, to"
+        " 100.",
+        unit="pixels",
+        group="cleaning",
+    )
+    removeFlying: bool = option(
+        True,
+        _check.boolean,
+        "bool",
+        "Whether to remove flying pixels (`flyingPixels`), which are holes then.",
+        group="cleaning",
     )
 
 
@@ -512,4 +556,5 @@ SEEDING = Seeding.options
 GROWING = {**MEASURED, **_of(Growing, "regions")}
 SEGMENTING = {**MEASURED, **Growing.options}
 LINKING = {**DETECTION, **Linking.options}
+CLEANING = {**MEASURED, **Cleaning.options}
 CLOSING = {**MEASURED, **Closing.options}

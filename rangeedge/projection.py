@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -124,7 +125,7 @@ def project(points: np.ndarray, **options: Unpack[GeometryOptions]) -> np.ndarra
     if points.shape[-1] != 3:
         raise fail("points", expected, f"one of shape {points.shape}")
     (params,) = parsed(options, ScanLineParams)
-    return to_pixels(points.astype(np.float64), read_frame(_ONE_PIXEL, params))
+    return to_pixels(points.astype(np.float64), read_frame(_ONE_PIXEL, replace(params, imageSize=None)))
 
 
 def to_pixels(points: np.ndarray, frame: Frame) -> np.ndarray:

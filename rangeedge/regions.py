@@ -15,6 +15,8 @@ from .distance import distanceTransform
 from .frame import Frame
 from .noise import measured_frame
 from .options import GROWING, SEGMENTING, Growing, ScanLineParams, Selection
+from .panorama import joined_labels
+from .sectors import around, sectors_of
 from .seeds import find_seeds, label_statistics
 from .surfaces import surface_map, surfaces_of
 
@@ -258,12 +260,19 @@ def _segmented(
 
 def seeded_regions(frame: Frame, edges: np.ndarray, growing: Growing) -> tuple[np.ndarray, np.ndarray]:
     """Seeds between the edges of a checked range image, and the regions that grow from them."""
-    distance = distanceTransform((edges != 0) | (frame.valid == 0))
-    _, seeds = find_seeds(distance, growing, None)
+    distance = around(frame, distanceTransform, (edges != 0) | (frame.valid == 0))
+    seeds = around(frame, lambda distance, wrap: find_seeds(distance, growing, None, wrap)[1], distance)
     return seeds, _grow(frame, seeds, edges, growing, True)
 
 
 def _grow(frame: Frame, markers: np.ndarray, edges: np.ndarray | None, growing: Growing, new_seeds: bool) -> np.ndarray:
+    parts = sectors_of(frame)
+    if parts:
+        grown = [
+            _grow(part.frame, part.take(markers), None if edges is None else part.take(edges), growing, new_seeds)
+            for part in parts
+        ]
+        return joined_labels(frame, parts, grown, growing.minArea)
     options = _core.RegionOptions(
         tolerance=growing.tolerance,
         smooth_angle=growing.smoothAngle,

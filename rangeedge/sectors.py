@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from .frame import Frame
 from .viewpoint import mean_ray, unit_rays
+
+if TYPE_CHECKING:
+    from .frame import Frame
 
 _WIDEST = np.deg2rad(150)  # image that needs no sectors
 _SECTOR = np.deg2rad(90)
 _MARGIN = np.deg2rad(30)  # that a sector overlaps its neighbours, so that surfaces go on beyond its end
 _CLOSED = np.deg2rad(300)  # from which on first and last line may be neighbours
 _NEIGHBOURS = 2.5  # steps between lines, up to which they are
+
+
+class Turn(NamedTuple):
+    """How far an image looks around: by `extent` across its lines along `axis`; `closed` where these come together."""
+
+    axis: int
+    extent: float
+    closed: bool
 
 
 class Sector(NamedTuple):
@@ -44,19 +54,40 @@ class Sector(NamedTuple):
         own[name] += self.start - self.first
         return own
 
+    def take(self, values: np.ndarray) -> np.ndarray:
+        """Values of all pixels at those of this sector."""
+        return np.take(values, self.lines(values.shape[self.axis]), self.axis)
+
+    def spread(self, whole: np.ndarray, values: np.ndarray) -> None:
+        """Write values of its pixels into those of all pixels, also where other sectors see them."""
+        lines = self.lines(whole.shape[self.axis])
+        whole[(slice(None), lines) if self.axis else lines] = values
+
+    def lines(self, count: int) -> np.ndarray:
+        """Which of the `count` lines of the whole its own are."""
+        return (np.arange(self.frame.shape[self.axis]) + self.start - self.first) % count
+
+
+def turn_of(samples: np.ndarray) -> Turn | None:
+    """How far points look around, where their rays are too far apart for one axis."""
+    rays = unit_rays(samples.astype(np.float64))
+    steps = [_steps(rays, axis) for axis in (0, 1)]
+    axis = int(steps[1].sum() > steps[0].sum())
+    extent = float(steps[axis].sum())
+    return Turn(axis, extent, _is_closed(rays, axis, steps[axis])) if extent > _WIDEST else None
+
 
 def sectors_of(frame: Frame) -> list[Sector]:
     """The sectors of an image whose rays are too far apart for one axis; none where they are not."""
-    if not frame.ranges:
-        return []
-    rays = unit_rays(frame.samples.astype(np.float64))
-    steps = [_steps(rays, axis) for axis in (0, 1)]
-    axis = int(steps[1].sum() > steps[0].sum())
-    along = steps[axis]
-    extent = float(along.sum())
-    if extent <= _WIDEST:
-        return []
-    return list(_divided(frame, axis, extent, is_closed(rays, axis, along)))
+    return list(_divided(frame, frame.turn)) if frame.turn else []
+
+
+def around(frame: Frame, function: Callable[..., np.ndarray], *maps: np.ndarray) -> np.ndarray:
+    """What a function makes of maps of the frame, which takes by `wrap` whether their rows wrap."""
+    if frame.seam == 0:
+        turned = [np.ascontiguousarray(values.T) for values in maps]
+        return np.ascontiguousarray(function(*turned, wrap=True).T)
+    return function(*maps, wrap=frame.seam is not None)
 
 
 def _steps(rays: np.ndarray, axis: int) -> np.ndarray:
@@ -80,17 +111,18 @@ def _angles(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), (a * b).sum(axis=1))
 
 
-def is_closed(rays: np.ndarray, axis: int, steps: np.ndarray) -> bool:
+def _is_closed(rays: np.ndarray, axis: int, steps: np.ndarray) -> bool:
     """Whether first and last line are neighbours."""
     middles = _middles(rays, axis)
     seen = middles[np.isfinite(middles[:, 0])]
     return bool(steps.sum() > _CLOSED and _angles(seen[-1:], seen[:1])[0] <= _NEIGHBOURS * np.median(steps))
 
 
-def _divided(frame: Frame, axis: int, extent: float, closed: bool) -> Iterator[Sector]:
+def _divided(frame: Frame, turn: Turn) -> Iterator[Sector]:
+    axis, extent, closed = turn
     count = frame.shape[axis]
     parts = int(np.ceil(extent / _SECTOR))
-    margin = int(np.ceil(count * _MARGIN / extent))
+    margin = int(count * _MARGIN / extent)
     bounds = np.linspace(0, count, parts + 1).astype(int)
     for start, stop in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):
         lines = np.arange(start - margin, stop + margin)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from . import _core
-from ._check import array, error, fail, image8, image32f
+from ._check import array, boolean, error, fail, image8, image32f
 from ._option import takes
 from .frame import threads_worth
 from .options import SEEDING, Seeding
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
 
 @takes(SEEDING)
 def extractSeeds(
-    distance: np.ndarray, *, mask: np.ndarray | None = None, **options: Unpack[SeedingOptions]
+    distance: np.ndarray, *, mask: np.ndarray | None = None, wrap: bool = False, **options: Unpack[SeedingOptions]
 ) -> tuple[int, np.ndarray]:
     """Markers in the middle of surfaces: the peaks of a distance map, each with the plateau around it.
 
-    extractSeeds(distance, *[, mask[, minDistance[, separation]]]) -> retval, markers
+    extractSeeds(distance, *[, mask[, wrap[, minDistance[, separation]]]]) -> retval, markers
 
     A pixel is a peak by itself where every 8-connected path to a higher one drops below ``separation`` times its
     distance; its seed is what can be reached from it without doing so, {p: D(p) >= separation D(peak)}. So a gap in an
@@ -39,6 +39,8 @@ def extractSeeds(
         pixels have no data, count them as edges of the map that is transformed, or leave them out by `mask`.
     mask : (H, W) CV_8U or bool, optional
         Where it is zero there are no seeds, nor ways between them.
+    wrap : bool
+        Whether the first column follows the last, as in a scan all around.
     {options}
 
     Returns
@@ -68,20 +70,20 @@ def extractSeeds(
     >>> extractSeeds(distance, minDistance=2, separation=0.75)
     (3, array([[0, 0, 0, 1, 0, 0, 0, 2, 2, 2, 0, 0, 0]], dtype=int32))
     """
-    return find_seeds(distance, Seeding(**options), mask)
+    return find_seeds(distance, Seeding(**options), mask, boolean("wrap", wrap))
 
 
 @takes(SEEDING)
 def extractSeedsWithStats(
-    distance: np.ndarray, *, mask: np.ndarray | None = None, **options: Unpack[SeedingOptions]
+    distance: np.ndarray, *, mask: np.ndarray | None = None, wrap: bool = False, **options: Unpack[SeedingOptions]
 ) -> tuple[int, np.ndarray, np.ndarray, np.ndarray]:
     """Markers in the middle of surfaces, with the extent and the centre of each.
 
-    extractSeedsWithStats(distance, *[, mask[, minDistance[, separation]]]) -> retval, markers, stats, centroids
+    extractSeedsWithStats(distance, *[, mask[, wrap[, minDistance[, separation]]]]) -> retval, markers, stats, centroids
 
     Parameters
     ----------
-    distance, mask
+    distance, mask, wrap
         As for `extractSeeds`.
     {options}
 
@@ -110,7 +112,7 @@ def extractSeedsWithStats(
     >>> stats[1:, cv2.CC_STAT_AREA], centroids[1:, 0]
     (array([1, 3], dtype=int32), array([3., 8.]))
     """
-    count, markers = find_seeds(distance, Seeding(**options), mask)
+    count, markers = find_seeds(distance, Seeding(**options), mask, boolean("wrap", wrap))
     return count, markers, *label_statistics(markers, count)
 
 
@@ -121,7 +123,7 @@ def label_statistics(labels: np.ndarray, count: int) -> tuple[np.ndarray, np.nda
     return boxes, centroids
 
 
-def find_seeds(distance: np.ndarray, seeding: Seeding, mask: np.ndarray | None) -> tuple[int, np.ndarray]:
+def find_seeds(distance: np.ndarray, seeding: Seeding, mask: np.ndarray | None, wrap: bool) -> tuple[int, np.ndarray]:
     """Number of labels, and markers of the seeds in a distance map."""
     distance = image32f("distance", array("distance", distance, "a real array of shape (H, W)"))
     if distance.size >= 2**30:
@@ -131,4 +133,5 @@ def find_seeds(distance: np.ndarray, seeding: Seeding, mask: np.ndarray | None) 
     mask = None if mask is None else image8("mask", mask, distance.shape)
     markers = np.empty(distance.shape, np.int32)
     threads = threads_worth(distance.size)
-    return _core.extract_seeds(distance, mask, seeding.minDistance, seeding.separation, threads, markers) + 1, markers
+    count = _core.extract_seeds(distance, mask, wrap, seeding.minDistance, seeding.separation, threads, markers) + 1
+    return count, markers

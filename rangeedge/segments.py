@@ -9,7 +9,7 @@ import numpy as np
 
 from ._check import described, fail, integer, number, public
 from .chains import EdgeChain, EdgeChains
-from .constants import EDGE_CONCAVE, EDGE_CONVEX
+from .constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
 
 SEGMENT = np.dtype(
     [
@@ -30,6 +30,10 @@ SEGMENT = np.dtype(
 )
 VERTEX = np.dtype([("point", "3f8"), ("x", "f8"), ("y", "f8"), ("rms", "f8"), ("count", "i4")])
 _FINEST = 1e-6  # share of its length to which a segment is known at best
+_FARTHEST = 4.0  # medians that an offset may be to count
+_COMMON_OF_JUMPS, _COMMON_OF_CREASES = 0.7, 0.5  # share of their scatter that neighbours have in common
+_MOST_ALIKE = 0.95  # of neighbouring offsets
+_LEAST_INDEPENDENT = 3.0
 _DEVIATIONS = 4.0  # that a line may pass a vertex by
 
 
@@ -41,6 +45,11 @@ class Segments(NamedTuple):
 
     def __repr__(self) -> str:
         return f"<{len(self.segments)} segments, {len(self.vertices)} vertices>"
+
+    def _repr_png_(self) -> bytes:
+        from .draw.shown import of_segments
+
+        return of_segments(self)
 
 
 @public
@@ -162,9 +171,10 @@ def _segment(chain: EdgeChain, points: np.ndarray, number: int) -> tuple:
     across = measured - np.outer(measured @ direction, direction)
     across = across[np.isfinite(across).all(axis=1)]
     rms, independent = _scatter(across)
-    finest = _FINEST * length
-    centre_deviation = float(np.hypot(rms / np.sqrt(independent), finest))
-    slope_deviation = centre_deviation * np.sqrt(12) / length if length > 0 else np.pi
+    centre_deviation = rms / np.sqrt(independent)
+    share = _COMMON_OF_JUMPS if chain.kind == EDGE_JUMP else _COMMON_OF_CREASES
+    common = np.hypot(share * rms, _FINEST * length)
+    slope_deviation = np.hypot(np.sqrt(12) * centre_deviation, common) / length if length > 0 else np.pi
     solid = {EDGE_CONVEX: 180 - chain.crease, EDGE_CONCAVE: 180 + chain.crease}.get(chain.kind, np.nan)
     return (
         ends,
@@ -175,7 +185,7 @@ def _segment(chain: EdgeChain, points: np.ndarray, number: int) -> tuple:
         chain.jump,
         solid,
         rms,
-        2 * centre_deviation,  # at an end, the deviations of centre and slope together
+        float(np.hypot(2 * centre_deviation, common)),  # at an end, the deviations of centre and slope together
         float(np.degrees(slope_deviation)),
         len(points),
         number,
@@ -184,15 +194,21 @@ def _segment(chain: EdgeChain, points: np.ndarray, number: int) -> tuple:
 
 
 def _scatter(across: np.ndarray) -> tuple[float, float]:
-    """Root mean square of offsets, and as how many independent ones they count."""
+    """Root mean square of offsets without those that lie far off, and as how many independent ones they count."""
     if len(across) < 3:
         return 0.0, 1.0
-    squares = (across**2).sum()
-    rms = float(np.sqrt(squares / len(across)))
+    distance = np.linalg.norm(across, axis=1)
+    across = across[distance <= _FARTHEST * np.median(distance) + 1e-300]
+    across = across - across.mean(axis=0)
+    n, squares = len(across), float((across**2).sum())
+    rms = float(np.sqrt(squares / n))
     if not squares > 0:
-        return rms, float(len(across))
-    correlation = float(np.clip((across[1:] * across[:-1]).sum() / squares, 0, 0.95))
-    return rms, max(len(across) * (1 - correlation) / (1 + correlation), 1.0)
+        return rms, float(n)
+    # A line that was fitted takes away likeness (Kendall, Biometrika 41, 1954) and scatter.
+    likeness = float((across[1:] * across[:-1]).sum()) / squares
+    likeness = float(np.clip(likeness + (1 + 3 * likeness) / n + 2 / n, 0, _MOST_ALIKE))
+    independent = max(n * (1 - likeness) / (1 + likeness), _LEAST_INDEPENDENT)
+    return rms, independent - 2
 
 
 # ---- Vertices ----
@@ -222,8 +238,7 @@ def _groups(segments: np.ndarray, reach: float) -> list[list[tuple[int, int]]]:
     if not ends:
         return []
     pixels, places = segments["pixels"].reshape(-1, 2), segments["ends"].reshape(-1, 3)
-    spans = np.linalg.norm(segments["pixels"][:, 1] - segments["pixels"][:, 0], axis=1)
-    per_pixel = np.repeat(segments["length"] / np.maximum(spans, 1), 2)  # length that a pixel covers
+    per_pixel = np.repeat(_per_pixel(segments), 2)
     group = np.arange(len(ends))
     order = np.argsort(pixels[:, 0], kind="stable")
     columns = pixels[order, 0]
@@ -256,10 +271,19 @@ def _vertex(
             ends = np.array([segments["pixels"][end] for end in group])
             if place is None or (np.linalg.norm(ends - place, axis=1) > 2 * reach).any():
                 return None  # lines that are nearly one meet anywhere
+            ends = np.array([segments["ends"][end] for end in group])
+            if (np.linalg.norm(ends - point, axis=1) > 2 * reach * _per_pixel(lines).max()).any():
+                return None  # and what is straight in space is so in the image of a camera only
             x, y = place
             return (point, x, y, float(np.sqrt(np.mean(off**2))), len(group)), group
         group = group[:worst] + group[worst + 1 :]
     return None
+
+
+def _per_pixel(lines: np.ndarray) -> np.ndarray:
+    """The length that a pixel covers."""
+    spans = np.linalg.norm(lines["pixels"][:, 1] - lines["pixels"][:, 0], axis=1)
+    return lines["length"] / np.maximum(spans, 1)
 
 
 def _image_directions(lines: np.ndarray) -> np.ndarray:

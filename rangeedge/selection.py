@@ -12,17 +12,15 @@ from . import _check, _core
 from ._check import public
 from ._option import takes
 from .constants import EDGE_BOUNDARY, EDGE_OCCLUDING
+from .dynamic import outstanding
 from .edges import EdgeStrength
 from .options import SELECTION, Selection
+from .pixels import beside, components, pixels_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from ._typed import RefinementOptions
-
-_CHAIN_ALPHA = 6.0  # Venkatesh and Rosin: how many deviations above the population an edge must stand
-_CHAIN_POPULATION = 10  # fewer chains than this have no statistics to speak of
-_MAD_TO_MEAN_DEVIATION = 1.4826 * np.sqrt(2 / np.pi)  # of a normal population
 
 
 @public
@@ -123,6 +121,7 @@ def selectEdges(
     jumpThreshold: float | None = None,
     creaseThreshold: float = 30.0,
     *,
+    wrap: bool = False,
     dst: np.ndarray | None = None,
     **options: Unpack[RefinementOptions],
 ) -> np.ndarray: ...
@@ -135,6 +134,7 @@ def selectEdges(
     jumpThreshold: float,
     creaseThreshold: float = 30.0,
     *,
+    wrap: bool = False,
     dst: np.ndarray | None = None,
     **options: Unpack[RefinementOptions],
 ) -> np.ndarray: ...
@@ -144,12 +144,13 @@ def selectEdges(
 def selectEdges(*args: Any, **options: Any) -> np.ndarray:
     """Select edge pixels by strength, by connection to strong ones, by length and by chain statistics.
 
-    selectEdges(strength[, jumpThreshold[, creaseThreshold]], *[, hysteresis[, minLength[, dynamic[, dst]]]]) -> dst
-    selectEdges(jump, crease, jumpThreshold[, creaseThreshold], *[, hysteresis[, minLength[, dynamic[, dst]]]]) -> dst
+    selectEdges(strength[, jumpThreshold[, creaseThreshold]], *[, wrap[, dst[, hysteresis[, ...]]]]) -> dst
+    selectEdges(jump, crease, jumpThreshold[, creaseThreshold], *[, wrap[, dst[, hysteresis[, ...]]]]) -> dst
 
     With what `edgeStrength` returns, this is the selection of `detectEdges` with its defaults, so that
     ``thinEdges(selectEdges(strength, ...))`` is the same map: jumps count on their nearer side, and creases where
-    three of their neighbours are creases as well, lest lines fray. With maps of jump and crease every pixel counts.
+    three of their neighbours are creases as well, lest lines fray; of a scan all around with ``wrap=True`` for both.
+    With maps of jump and crease every pixel counts.
 
     The steps run in this order, each on what the one before has left:
 
@@ -182,6 +183,8 @@ def selectEdges(*args: Any, **options: Any) -> np.ndarray:
     dynamic : bool
         Whether to apply the dynamic threshold. It needs a map whose candidates are mostly noise, so pass
         strengths found with ``minSignificance=0`` and low thresholds.
+    wrap : bool
+        Whether the first column follows the last, as in a scan all around.
     dst : ndarray of shape (H, W), CV_8U, optional
         Receives the result where shape and type fit.
 
@@ -237,6 +240,7 @@ def _of_strength(
     jumpThreshold: float | None = None,
     creaseThreshold: float = 30.0,
     *,
+    wrap: bool = False,
     dst: np.ndarray | None = None,
     **options: Any,
 ) -> np.ndarray:
@@ -244,7 +248,8 @@ def _of_strength(
     jump = _check.strength32f("strength.jump", strength.jump)
     crease = _check.strength32f("strength.crease", strength.crease, jump.shape)
     kind = _check.image8("strength.kind", strength.kind, jump.shape)
-    edges = select_strength(EdgeStrength(jump, crease, kind, strength.significance), selection)
+    checked = EdgeStrength(jump, crease, kind, strength.significance)
+    edges = select_strength(checked, selection, _check.boolean("wrap", wrap))
     return _check.deliver("dst", edges, dst)
 
 
@@ -255,6 +260,7 @@ def _of_maps(
     jumpThreshold: float,
     creaseThreshold: float = 30.0,
     *,
+    wrap: bool = False,
     dst: np.ndarray | None = None,
     **options: Any,
 ) -> np.ndarray:
@@ -262,47 +268,52 @@ def _of_maps(
     crease = _check.strength32f("crease", crease, jump.shape)
     jumpThreshold = _check.threshold("jumpThreshold", jumpThreshold)
     selection = Selection(jumpThreshold=jumpThreshold, creaseThreshold=creaseThreshold, **{"minLength": 1, **options})
-    return _check.deliver("dst", select_maps(jump, crease, selection), dst)
+    return _check.deliver("dst", select_maps(jump, crease, selection, wrap=_check.boolean("wrap", wrap)), dst)
 
 
 selectEdges.__signature__ = inspect.signature(_of_strength)  # type: ignore[attr-defined]
 
 
-def select_strength(strength: EdgeStrength, selection: Selection) -> np.ndarray:
+def select_strength(strength: EdgeStrength, selection: Selection, wrap: bool = False) -> np.ndarray:
     """The edge map before thinning: jumps on their nearer side, creases that do not stand alone, borders if wanted."""
     jump = cv2.copyTo(strength.jump, strength.kind & np.uint8(EDGE_OCCLUDING))
-    crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold)
-    edges = select_maps(jump, crease, selection, strength.significance)
+    crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold, wrap)
+    edges = select_maps(jump, crease, selection, strength.significance, wrap=wrap)
     if selection.boundaryEdges:
         edges[(strength.kind & EDGE_BOUNDARY) > 0] = 255
     return edges
 
 
 def select_maps(
-    jump: np.ndarray, crease: np.ndarray, selection: Selection, significance: np.ndarray | None = None
+    jump: np.ndarray,
+    crease: np.ndarray,
+    selection: Selection,
+    significance: np.ndarray | None = None,
+    *,
+    wrap: bool = False,
 ) -> np.ndarray:
     """The edge map, 0 and 255, of checked strengths."""
     thresholds, hysteresis = (selection.jumpThreshold or 0.0, selection.creaseThreshold), selection.hysteresis
     edges = _reaching(jump, crease, thresholds)
     if hysteresis < 1:
         low = (hysteresis * thresholds[0], hysteresis * thresholds[1])
-        edges = _connected_to(edges, _reaching(jump, crease, low))
+        edges = _connected_to(edges, _reaching(jump, crease, low), wrap)
     if selection.minLength > 1 or (significance is not None and selection.lineSignificance > 0):
-        edges = _lines(edges, selection.minLength, significance, selection.lineSignificance)
+        edges = _lines(edges, selection.minLength, significance, selection.lineSignificance, wrap)
     if selection.dynamic:
-        edges &= _outstanding(jump) | _outstanding(crease)
+        edges &= outstanding(jump, wrap) | outstanding(crease, wrap)
     return edges.view(np.uint8) * np.uint8(255)
 
 
-def _unfrayed(crease: np.ndarray, least: float) -> np.ndarray:
+def _unfrayed(crease: np.ndarray, least: float, wrap: bool) -> np.ndarray:
     """Creases without stray pixels: of the nine around one that stays, four reach `least`.
 
     In an image of one or two rows or columns lines cannot have so many neighbours: all its creases stay.
     """
     if min(crease.shape) < 3:
         return crease
-    strong = _at_least(crease, least).view(np.uint8)
-    around = cv2.boxFilter(strong, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)
+    strong = beside(_at_least(crease, least).view(np.uint8), wrap)
+    around = cv2.boxFilter(strong, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)[1:-1, 1:-1]
     return cv2.copyTo(crease, (around >= 4).view(np.uint8))
 
 
@@ -327,84 +338,18 @@ def _at_least(strength: np.ndarray, threshold: float) -> np.ndarray:
     return strength >= threshold if threshold > 0 else strength > 0
 
 
-def _connected_to(strong: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+def _connected_to(strong: np.ndarray, candidates: np.ndarray, wrap: bool) -> np.ndarray:
     """The 8-connected components of `candidates` that hold a pixel of `strong`, a subset of them."""
-    count, labels = cv2.connectedComponents(candidates.view(np.uint8))
+    count, labels = components(candidates, wrap)
     keep = np.zeros(count, bool)
     keep[labels[strong]] = True
-    return _pixels_of(candidates, labels, keep)
+    return pixels_of(candidates, labels, keep)
 
 
-def _lines(edges: np.ndarray, minLength: int, significance: np.ndarray | None, lineSignificance: float) -> np.ndarray:
+def _lines(
+    edges: np.ndarray, minLength: int, significance: np.ndarray | None, lineSignificance: float, wrap: bool
+) -> np.ndarray:
     """The lines that are significant, but for short pieces."""
     kept = np.empty(edges.shape, np.uint8)
-    _core.keep_lines(edges.view(np.uint8), minLength, significance, lineSignificance, kept)
+    _core.keep_lines(edges.view(np.uint8), wrap, minLength, significance, lineSignificance, kept)
     return kept.view(bool)
-
-
-def _pixels_of(edges: np.ndarray, labels: np.ndarray, keep: np.ndarray) -> np.ndarray:
-    """The pixels of `edges` whose label is one to keep; only edge pixels are looked up."""
-    kept = np.zeros_like(edges)
-    kept[edges] = keep[labels[edges]]
-    return kept
-
-
-def _outstanding(strength: np.ndarray) -> np.ndarray:
-    """Where the nearest chain of candidates passes the threshold of Venkatesh and Rosin."""
-    candidates = strength > 0
-    if not candidates.any():
-        return candidates
-    chains = _chains(candidates)
-    _, nearest = cv2.distanceTransformWithLabels(
-        (~chains).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_CCOMP
-    )
-    owner = nearest[chains] - 1
-    length = np.bincount(owner)
-    mean = np.bincount(owner, weights=strength[chains]) / length
-    keep = _stands_out(length, mean)
-    outstanding = np.zeros_like(candidates)
-    outstanding[candidates] = keep[nearest[candidates] - 1]
-    return outstanding
-
-
-def _chains(edges: np.ndarray) -> np.ndarray:
-    """The skeleton of a map, cut at its junctions; what is nothing but junction stays whole."""
-    from skimage.morphology import skeletonize
-
-    skeleton = skeletonize(edges)
-    junctions = _branches(skeleton) > 2
-    # A branch of a junction touches its neighbours diagonally: one pixel more has to go.
-    cut = skeleton & ~cv2.dilate(junctions.view(np.uint8), np.ones((3, 3), np.uint8)).view(bool)
-    count, labels = cv2.connectedComponents(skeleton.view(np.uint8))
-    survives = np.zeros(count, bool)
-    survives[labels[cut]] = True
-    return cut | _pixels_of(skeleton, labels, ~survives)
-
-
-def _branches(skeleton: np.ndarray) -> np.ndarray:
-    """How many branches leave every skeleton pixel: changes from off to on around it."""
-    ring = [(-1, -1), (-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1)]
-    row, col = np.nonzero(skeleton)
-    padded = np.pad(skeleton, 1)
-    around = np.stack([padded[row + 1 + dy, col + 1 + dx] for dy, dx in ring])
-    branches = np.zeros(skeleton.shape, np.uint8)
-    branches[row, col] = (around & ~np.roll(around, 1, axis=0)).sum(axis=0)
-    return branches
-
-
-def _stands_out(length: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """Which chains lie above the line of Venkatesh and Rosin through (0, high) and (long, high - drop)."""
-    if len(length) < _CHAIN_POPULATION:
-        return np.ones(len(length), bool)
-    centre, deviation = _population(mean)
-    centre_length, deviation_length = _population(length)
-    high = centre + _CHAIN_ALPHA * deviation
-    drop = 0.5 * _CHAIN_ALPHA * deviation
-    long = centre_length + _CHAIN_ALPHA * deviation_length
-    return mean >= high - drop * length / long
-
-
-def _population(values: np.ndarray) -> tuple[float, float]:
-    """Robust centre and mean absolute deviation."""
-    centre = np.median(values)
-    return centre, _MAD_TO_MEAN_DEVIATION * np.median(np.abs(values - centre))

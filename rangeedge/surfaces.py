@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
 from . import _core
-from ._check import error
 from .frame import Frame
-from .sectors import sectors_of
 
 SURFACE = np.dtype([("curved", np.bool_), ("centroid", "3f8"), ("normal", "3f8"), ("quadric", "10f8"), ("rms", "f8")])
+_CURVED_GAIN = 0.8  # a quadratic must lower the rms of a plane to this share
+_LEAST_RELIEF = 1e-6  # of the rms of a plane, in inverse distances
+_LEAST_CURVED = 40  # pixels; fewer tell no curvature
 _LEAST_GRADIENT = 0.01  # of a quadric, of its typical one, where a distance is F / |grad F|
 # Exponents of x, y, z: those of the moments that the core adds up, and those of a quadric's terms.
 _EXPONENTS = [(i, j, n - i - j) for n in range(5) for i in range(n, -1, -1) for j in range(n - i, -1, -1)]
@@ -21,40 +23,38 @@ _PLACE = {e: n for n, e in enumerate(_EXPONENTS)}
 
 def surface_map(frame: Frame, edges: np.ndarray | None) -> _core.RangeMap:
     """What the kernels on surfaces take: places on the image plane, ordinates and their noise, edges."""
-    x, y, to_plane = _places(frame)
+    x, y, to_plane = places(frame)
+    relative, offset, rounding = relative_ordinate(frame)
+    return _core.RangeMap(frame.kernel, x, y, relative, offset, rounding, to_plane, edges)
+
+
+def relative_ordinate(frame: Frame) -> tuple[np.ndarray, float, float]:
+    """Ordinates of which planes are affine functions, less an offset, in single precision; the offset, its rounding."""
     ordinate = _along_axis(frame)
     seen = ordinate[np.isfinite(ordinate)]
     offset = float(seen[:: max(1, len(seen) // 4096)].mean(dtype=np.float64)) if len(seen) else 0.0
     with np.errstate(invalid="ignore", over="ignore"):  # signalling NaN; beyond single precision
         relative = (ordinate - ordinate.dtype.type(offset)).astype(np.float32, copy=False)
-    rounding = float(np.spacing(np.abs(ordinate.dtype.type(offset))))
-    return _core.RangeMap(frame.kernel, x, y, relative, offset, rounding, to_plane, edges)
+    return relative, offset, float(np.spacing(np.abs(ordinate.dtype.type(offset))))
 
 
 def _along_axis(frame: Frame) -> np.ndarray:
     """Ordinates of which planes are affine functions of the image plane."""
     if not frame.ranges:
         return frame.ordinate
-    if sectors_of(frame):
-        raise error(
-            "`src` must hold points of a sector below 150 degrees, whose surfaces can be seen on one image plane;"
-            " take the columns of one sector after the other"
-        )
     return replace(frame, ranges=False).ordinate
 
 
-def _places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[float, ...]]:
+def places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[float, ...]]:
     """Where pixels lie on the image plane, in units of about a pixel, and how that becomes coordinates.
 
     None for a regular grid: columns and rows.
     """
     if frame.samples.ndim == 2:
         return None, None, frame.to_plane
-    axis = np.asarray(frame.axis)
-    across = np.cross((0, 1, 0) if abs(axis[1]) < 0.9 else (1, 0, 0), axis)
-    across /= np.linalg.norm(across)
+    right, down, axis = _plane_axes(frame)
     points = frame.samples.astype(np.float64)
-    x, y = points @ across, points @ np.cross(axis, across)
+    x, y = points @ right, points @ down
     if frame.projective:
         with np.errstate(divide="ignore", invalid="ignore"):
             x, y = x / (points @ axis), y / (points @ axis)
@@ -65,17 +65,40 @@ def _places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[f
     return (x / spacing).astype(np.float32), (y / spacing).astype(np.float32), to_plane
 
 
+def _plane_axes(frame: Frame) -> np.ndarray:
+    """Two directions on the plane of an image of points, and that of view, as rows."""
+    axis = np.asarray(frame.axis)
+    right = np.cross((0, 1, 0) if abs(axis[1]) < 0.9 else (1, 0, 0), axis)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(axis, right), axis])
+
+
+def in_space(frame: Frame, x: np.ndarray, y: np.ndarray, to_plane: tuple[float, ...], z: np.ndarray) -> np.ndarray:
+    """(..., 3) points seen at places (x, y) of `places` with ordinates z; NaN where z is that of no point."""
+    a, b, c, d, e, f = to_plane
+    u, v = a * x + b * y + c, d * x + e * y + f
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = np.where(z > 0, 1 / z, np.nan) if frame.projective else -z
+    if frame.projective:
+        u, v = u * along, v * along
+    if frame.samples.ndim == 2:
+        return np.stack([u, v, -along if frame.heightMap else along], axis=-1)
+    return np.stack([u, v, along], axis=-1) @ _plane_axes(frame) + np.asarray(frame.origin)
+
+
 def surfaces_of(frame: Frame, labels: np.ndarray, count: int) -> np.ndarray:
     """The plane, or the quadric where a plane fails, of every label 1 .. count - 1."""
     surfaces = np.zeros(count, SURFACE)
     points = frame.points
     origins, scales = np.zeros((count, 3)), np.ones(count)
     moments, curved = np.zeros((count, len(_EXPONENTS))), np.zeros(count, np.uint8)
-    ordinate = _along_axis(frame).astype(np.float64, copy=False)
+    ordinate = frame.ordinate.astype(np.float64, copy=False)
     _core.region_moments(labels, points, ordinate, frame.threads, origins, scales, moments, curved)
     # Planes and quadrics in (p - origin) / scale, as coefficients of _TERMS and 1, with a gradient of about 1.
     mean, normal, rms = _planes(moments)
     quadrics = np.concatenate([np.zeros((count, 6)), normal, -(normal * mean).sum(axis=1, keepdims=True)], axis=1)
+    if frame.ranges:
+        curved = _curved(frame, labels, count)
     curved = curved.view(bool)
     quadrics[curved] = _taubin(moments[curved])
     misfits = np.zeros(count)
@@ -103,6 +126,38 @@ def _planes(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     second = [[_PLACE[tuple(a + b)] for b in np.eye(3, dtype=int)] for a in np.eye(3, dtype=int)]
     values, vectors = np.linalg.eigh(moments[:, second] - mean[:, :, None] * mean[:, None, :])
     return mean, vectors[:, :, 0], np.sqrt(np.maximum(values[:, 0], 0.0))
+
+
+def _curved(frame: Frame, labels: np.ndarray, count: int) -> np.ndarray:
+    """Whether quadratics of the lines of sight describe the inverse distances of regions better than planes do.
+
+    A plane n . P = d has the inverse distance n . e / d along the ray e. Pixels at borders may belong to either side:
+    they are left out.
+    """
+    inside = labels > 0
+    inside[1:] &= labels[1:] == labels[:-1]
+    inside[:-1] &= labels[1:] == labels[:-1]
+    inside[:, 1:] &= labels[:, 1:] == labels[:, :-1]
+    inside[:, :-1] &= labels[:, 1:] == labels[:, :-1]
+    order = np.argsort(labels[inside], kind="stable")
+    points = frame.samples[inside][order].astype(np.float64)
+    firsts = np.searchsorted(labels[inside][order], np.arange(1, count + 1))
+    curved = np.zeros(count, bool)
+    for label, (first, end) in enumerate(pairwise(firsts.tolist()), 1):
+        if end - first < _LEAST_CURVED:
+            continue
+        inverse = 1 / np.linalg.norm(points[first:end], axis=1)
+        rays = points[first:end] * inverse[:, None]
+        products = [rays[:, i] * rays[:, j] for i in range(3) for j in range(i, 3)]
+        of_plane = _left_over(rays, inverse)
+        if of_plane > _LEAST_RELIEF * np.linalg.norm(inverse):
+            curved[label] = _left_over(np.column_stack([rays, *products]), inverse) < _CURVED_GAIN * of_plane
+    return curved
+
+
+def _left_over(terms: np.ndarray, values: np.ndarray) -> float:
+    """The norm of what a fit of terms leaves of values."""
+    return float(np.linalg.norm(values - terms @ np.linalg.lstsq(terms, values, rcond=1e-10)[0]))
 
 
 def _taubin(moments: np.ndarray) -> np.ndarray:

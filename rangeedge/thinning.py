@@ -7,6 +7,7 @@ import numpy as np
 
 from . import _check, _core
 from .constants import THIN_ITERATIVE, THIN_LEE, THIN_MEDIAL, THIN_SKELETON
+from .pixels import all_around
 
 _METHODS = {
     "THIN_SKELETON": THIN_SKELETON,
@@ -18,11 +19,16 @@ _METHODS = {
 
 @_check.public
 def thinEdges(
-    edges: np.ndarray, method: int = THIN_MEDIAL, dst: np.ndarray | None = None, *, spurLength: int = 5
+    edges: np.ndarray,
+    method: int = THIN_MEDIAL,
+    dst: np.ndarray | None = None,
+    *,
+    spurLength: int = 5,
+    wrap: bool = False,
 ) -> np.ndarray:
     """Thin an edge map to lines one pixel wide that are connected as the map was.
 
-    thinEdges(edges[, method[, dst]], *[, spurLength]) -> dst
+    thinEdges(edges[, method[, dst]], *[, spurLength[, wrap]]) -> dst
 
     The lines are a subset of `edges` with the same number of 8-connected components and of holes, they are as long
     as the bands they come from, and run into the image border where these do. No pixel can be spared but the ends of
@@ -43,6 +49,8 @@ def thinEdges(
     spurLength : int
         Branches that end freely after fewer pixels than that are removed, those inside the band that they leave not
         counted; 0 keeps all. A line with two free ends is no branch, however short.
+    wrap : bool
+        Whether the first column follows the last, as in a scan all around.
 
     Returns
     -------
@@ -78,9 +86,15 @@ def thinEdges(
     edges = _check.image8("edges", edges)
     method = _check.flag("method", method, _METHODS)
     spurLength = _check.integer("spurLength", spurLength, 0)
+    if _check.boolean("wrap", wrap):
+        return _check.deliver("dst", all_around(edges, lambda wide: _thin(wide, method, spurLength)), dst)
+    return _check.deliver("dst", _thin(edges, method, spurLength), dst)
+
+
+def _thin(edges: np.ndarray, method: int, spur_length: int) -> np.ndarray:
     thin = np.empty_like(edges)
-    _core.thin_lines(edges, None if method == THIN_MEDIAL else _skeleton(edges, method), spurLength, thin)
-    return _check.deliver("dst", thin, dst)
+    _core.thin_lines(edges, None if method == THIN_MEDIAL else _skeleton(edges, method), spur_length, thin)
+    return thin
 
 
 def _skeleton(edges: np.ndarray, method: int) -> np.ndarray:

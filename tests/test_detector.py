@@ -45,6 +45,7 @@ def another(name, default):
         "distCoeffs": np.array([0.1, -0.2 / 3, 1e-3, 0, 0.01]),
         "invalid": ((-9999.0, -9999.0), (8.1, np.inf)),
         "origin": (0.1, -2.0, 1 / 3),
+        "imageSize": (64, 48),
     }
     if name in special:
         return special[name]

@@ -20,16 +20,19 @@ import rangeedge
 from rangeedge import _core
 
 PUBLIC = """
-    error RangeEdgeWarning RangeImage imreadRange imwriteRange sweepToPoints backproject project NoiseModel
+    error RangeEdgeWarning Cancellation RangeImage imreadRange imwriteRange sweepToPoints backproject project NoiseModel
     estimateNoise ScanLineParams splitScanLine EdgeStrength edgeStrength edgePoints kindNames flyingPixels
     strengthImage overallStrength selectEdges thinEdges detectEdges detectEdgesWithStrength ScanLineDetector
-    createScanLineDetector EdgeChain EdgeChains linkEdges Segments fitSegments writeLines closeContours
+    Explanation explainPixel
+    createScanLineDetector mapFrames EdgeChain EdgeChains linkEdges Segments fitSegments writeLines closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
     extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats
-    regionAdjacency
-    drawEdges drawChains drawSegments drawRegions colorizeDistance drawOverview
+    RegionBoundary RegionBoundaries regionBoundaries regionAdjacency cleanDepth
+    drawEdges drawChains drawSegments drawRegions drawBoundaries colorizeDistance drawOverview drawPanels
+    drawExplanation
     DIR_ROWS DIR_COLS DIR_DIAG45 DIR_DIAG135 DIR_ALL FIT_LSQ FIT_INTERP MEASURE_MIDPOINT MEASURE_ENDPOINT
     CREASE_MAX CREASE_NORMAL EDGE_JUMP EDGE_CONVEX EDGE_CONCAVE EDGE_OCCLUDING EDGE_OCCLUDED EDGE_BOUNDARY
+    CLEAN_SMOOTHED CLEAN_REMOVED CLEAN_FILLED
     THIN_SKELETON THIN_LEE THIN_ITERATIVE THIN_MEDIAL SALIENCE_MULTIPLICATIVE SALIENCE_ADDITIVE
 """.split()  # noqa: SIM905
 IMPORT_SHARE = 1.0  # of what NumPy and OpenCV take together

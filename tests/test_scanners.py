@@ -48,8 +48,8 @@ def camera_axes(points):
 
 
 @pytest.mark.parametrize("tilt", [0, 10])
-@pytest.mark.parametrize("noise", [0, 0.005])
-@pytest.mark.parametrize("rows", [32, 64, 128])
+@pytest.mark.parametrize("noise", [0, 0.005, 0.015])
+@pytest.mark.parametrize("rows", [16, 32, 64, 128])
 def test_a_room_all_around(rows, noise, tilt):
     rays, ranges, faces = sweep(rows, 22.5, (180, -180), tilt)
     points = rays * (ranges + noise * np.random.default_rng(0).standard_normal(ranges.shape))[..., None]
@@ -212,10 +212,144 @@ def test_no_distortion_changes_nothing():
         edgeStrength(z, distCoeffs=np.zeros(4))
 
 
-def test_surfaces_of_a_sector_are_found_and_those_all_around_refused():
+# Whatever comes after the edges, all around.
+
+
+def room(rows=64, columns=0, noise=0.003, tilt=0):
+    """Points of the room and its faces, turned by some columns."""
+    rays, ranges, faces = sweep(rows, 22.5, (180, -180), tilt)
+    points = rays * (ranges + noise * np.random.default_rng(4).standard_normal(ranges.shape))[..., None]
+    return np.roll(points, columns, 1), np.roll(faces, columns, 1)
+
+
+def test_surfaces_of_a_sector_are_planes():
     rays, ranges, faces = sweep(64, 20, (50, -50))
     points = rays * (ranges + 0.003 * np.random.default_rng(4).standard_normal(ranges.shape))[..., None]
-    assert segmentRegions(points).max() == len(np.unique(faces))
-    rays, ranges, _ = sweep(64, 20, (180, -180))
-    with pytest.raises(rangeedge.error, match="segmentRegions: `src` must hold points of a sector"):
-        segmentRegions(rays * ranges[..., None], noise=0.003)
+    count, _, _, _, surfaces = rangeedge.segmentRegionsWithStats(points)
+    assert count - 1 == len(np.unique(faces))
+    assert not surfaces["curved"].any()
+
+
+@pytest.mark.parametrize("origin", [None, (4, -7, 1.1)])
+@pytest.mark.parametrize("columns", [0, 100, 250])
+def test_surfaces_all_around(columns, origin):
+    points, faces = room(columns=columns)
+    if origin:
+        points = points + origin
+    count, labels, _, _, surfaces = rangeedge.segmentRegionsWithStats(points, origin=origin)
+    assert count - 1 == 7  # the ceiling is seen in two parts
+    for face in range(6):
+        own = np.bincount(labels[faces == face], minlength=count)
+        assert np.sort(own)[-2:].sum() > 0.99 * own.sum()
+    for label in range(1, count):
+        face = np.bincount(faces[labels == label]).argmax()
+        axis, place = WALLS[face]
+        assert abs(surfaces["normal"][label][axis]) > 0.9999
+        assert surfaces["centroid"][label][axis] == pytest.approx(place + (origin or (0, 0, 0))[axis], abs=0.002)
+        assert surfaces["rms"][label] < 0.004
+        assert not surfaces["curved"][label]
+
+
+def test_a_sphere_all_around_is_curved():
+    rays, _, _ = sweep(64, 22.5, (180, -180))
+    off = np.array([0.5, 0.3, 0.0])  # the centre
+    along = rays @ off
+    points = rays * (along + np.sqrt(9 - off @ off + along**2))[..., None]
+    count, labels, _, _, surfaces = rangeedge.segmentRegionsWithStats(points, noise=0.002)
+    assert count == 2
+    assert (labels == 1).all()
+    assert surfaces["curved"][1]
+    assert surfaces["rms"][1] < 1e-3
+
+
+def test_regions_all_around_do_not_depend_on_threads_nor_on_the_seam():
+    points, _ = room(128)
+    threads = cv2.getNumThreads()
+    try:
+        cv2.setNumThreads(1)
+        labels = segmentRegions(points)
+        cv2.setNumThreads(4)
+        np.testing.assert_array_equal(segmentRegions(points), labels)
+    finally:
+        cv2.setNumThreads(threads)
+    quarter = COLUMNS // 4  # sectors fall on sectors
+    there = segmentRegions(np.roll(points, quarter, 1))
+    assert np.unique(np.stack([np.roll(labels, quarter, 1), there]).reshape(2, -1), axis=1).shape[1] == labels.max()
+    upright = segmentRegions(np.ascontiguousarray(points.transpose(1, 0, 2)))
+    assert upright.max() == labels.max()
+    assert (detectEdges(points) == detectEdges(np.ascontiguousarray(points.transpose(1, 0, 2))).T).mean() > 0.995
+
+
+def test_what_walls_touch_all_around():
+    for columns, origin in ((0, None), (250, (4, -7, 1.1))):
+        points, _ = room(columns=columns)
+        points = points + (origin or (0, 0, 0))
+        labels = segmentRegions(points, origin=origin)
+        pairs = rangeedge.regionAdjacency(points, labels, origin=origin)
+        pairs = pairs[pairs["contacts"] > 5]
+        assert (pairs["kind"] == rangeedge.EDGE_CONCAVE).all()
+        np.testing.assert_allclose(pairs["dihedral"], 270, atol=0.5)
+        assert len(pairs) == 13 or len(pairs) == 14  # a corner of the ceiling is hardly seen
+        assert pairs["contacts"].sum() > 1100
+
+
+def test_adjacent_surfaces_of_a_cloud_in_another_frame():
+    z = depth_of(rays_of())
+    labels, place = segmentRegions(z, K=K), np.array([4, -7, 1.1])
+    here = rangeedge.regionAdjacency(z, labels, K=K)
+    there = rangeedge.regionAdjacency(rays_of() * z[..., None] + place, labels, origin=place)
+    np.testing.assert_array_equal(here["kind"], there["kind"])
+    for name in ("contacts", "jump", "dihedral"):
+        np.testing.assert_allclose(here[name], there[name], atol=1e-3)
+    np.testing.assert_allclose(here["point"] + place, there["point"], atol=1e-3)
+
+
+def test_chains_of_a_cloud_in_another_frame():
+    z, place = depth_of(rays_of()), np.array([4, -7, 1.1])
+    here = rangeedge.linkEdges(z, K=K)
+    there = rangeedge.linkEdges(rays_of() * z[..., None] + place, origin=place)
+    assert len(here) == len(there)
+    np.testing.assert_array_equal(here.chains["kind"], there.chains["kind"])
+    for name in ("point", "behind", "measured"):
+        np.testing.assert_allclose(here.points[name] + place, there.points[name], atol=0.02)
+
+
+@pytest.mark.parametrize("noise", [0, 0.003])
+@pytest.mark.parametrize("columns", [0, 100, 250])
+def test_chains_all_around(columns, noise):
+    points, _ = room(columns=columns, noise=noise)
+    chains = rangeedge.linkEdges(points)
+    places = chains.points["point"]
+    off = np.sort(np.stack([np.abs(places[:, axis] - place) for axis, place in WALLS], 1), 1)
+    assert np.median(off[:, 1]) < 0.01  # every point lies on two walls
+    assert np.quantile(off[:, 1], 0.95) < 0.1
+    assert chains.chains["pixels"].max() < 160  # none runs back around
+    segments, _ = rangeedge.fitSegments(chains, tolerance=0.05)
+    for length, number in ((9.0, 2), (8.0, 2), (3.0, 4)):  # of the floor, and between floor and ceiling
+        assert (np.abs(segments["length"] - length) < 0.05).sum() >= number
+
+
+def test_a_jump_all_around_is_one_chain():
+    rays, _, _ = sweep(64, 15, (180, -180))
+    ranges = np.full(rays.shape[:2], 4.0)
+    ranges[20:40] = 3.0  # a ring
+    chains = rangeedge.linkEdges(rays * ranges[..., None], noise=0.002)
+    rings = [chain for chain in chains if len(chain) > 100]
+    assert len(rings) == 2
+    for ring in rings:
+        assert ring.closed
+        assert ring.pixels == pytest.approx(COLUMNS, rel=0.05)
+        assert ring.jump == pytest.approx(1, abs=0.05)
+        assert ring.length == pytest.approx(2 * np.pi * 3, rel=0.05)
+
+
+def test_contours_are_closed_all_around():
+    points, faces = room()
+    whole = detectEdges(points) > 0
+    broken = whole.copy()
+    broken[30:34] = False  # in all vertical edges
+    broken[:, 508:] = broken[:, :4] = False  # and in those along the seam
+    closed = rangeedge.closeContours(broken.astype(np.uint8), points) > 0
+    assert (closed | ~broken).all()
+    assert near(closed & ~broken, borders(faces)) > 0.95
+    assert (closed & ~broken).sum() > 0.7 * (whole & ~broken).sum()

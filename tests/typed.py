@@ -19,6 +19,7 @@ KEYWORDS = {
     "Growing": options.GROWING,
     "Segmenting": options.SEGMENTING,
     "Closing": options.CLOSING,
+    "Cleaning": options.CLEANING,
     "Joining": options.Linking.options,
 }
 HEAD = '''"""The options as editors and type checkers know them, by ``python tests/typed.py`` from `options.py`."""

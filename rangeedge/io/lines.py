@@ -18,6 +18,7 @@ from ..chains import EdgeChain, EdgeChains
 from ..edges import kindNames
 from ..segments import SEGMENT, Segments
 from .atomic import write_atomically
+from .source import file_name
 
 
 class _Line(NamedTuple):
@@ -72,10 +73,7 @@ def writeLines(
     ...     print(file.readline().strip())
     o convex_0
     """
-    try:
-        name = os.fspath(filename)
-    except TypeError:
-        raise fail("filename", "a string or a path", described(filename)) from None
+    name = file_name(filename, "filename")
     suffix = PurePath(name).suffix.lower()
     if suffix not in _WRITERS:
         raise error(f"cannot write {name!r}: the suffix must be one of {', '.join(_WRITERS)}")
@@ -84,8 +82,9 @@ def writeLines(
     data = encoded_lines(suffix, lines, transform)
     try:
         write_atomically(name, data)
-    except OSError as reason:
-        raise error(f"cannot write {name!r}: {reason.strerror or reason}", cv2.Error.StsError) from reason
+    except (OSError, ValueError) as reason:
+        what = getattr(reason, "strerror", None) or reason
+        raise error(f"cannot write {name!r}: {what}", cv2.Error.StsError) from reason
 
 
 def encoded_lines(suffix: str, lines: Any, transform: Sequence[float] | None = None) -> bytes:

@@ -19,7 +19,7 @@ class RangeImage(_SourceAndGeometry):
     ----------
     src : (H, W) integers or floats, or (H, W, 3) or (H, W, 4) float points
     geometry : dict
-        Those of `K`, `pixelSize`, `heightMap` and `depthFactor` that the file knows.
+        Those of `K`, `distCoeffs`, `pixelSize`, `heightMap` and `depthFactor` that the file knows.
     viewpoint : tuple of 7 floats or None
         Where the points were taken from, in their own frame: translation (x, y, z) and unit quaternion (w, x, y, z) of
         the sensor, as PCD files have it. None where the file does not say.
@@ -67,3 +67,8 @@ class RangeImage(_SourceAndGeometry):
         extent = f", {values.size} values from {values.min():.6g} to {values.max():.6g}" if values.size else ", no data"
         known = "".join(f", {name}" for name in self.geometry)
         return f"RangeImage({self.src.dtype} of shape {self.src.shape}{extent}{known})"
+
+    def _repr_png_(self) -> bytes:
+        from ..draw.shown import of_image
+
+        return of_image(self.src, self.geometry)

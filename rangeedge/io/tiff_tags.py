@@ -12,7 +12,7 @@ _TYPES = {
     **{1: "u1", 2: "S1", 3: "u2", 4: "u4", 6: "i1", 7: "u1", 8: "i2", 9: "i4", 11: "f4", 12: "f8", 13: "u4"},
     **{16: "u8", 17: "i8", 18: "u8"},
 }
-_PAGES = 4096  # more than that are not counted
+PAGES = 4096  # of an image of its own; more than that are not counted
 
 NEW_SUBFILE_TYPE = 254
 WIDTH = 256
@@ -80,7 +80,7 @@ class Page:
         return self.values(code).tobytes().split(b"\0")[0].decode("latin-1").strip()
 
 
-def pages(data: bytes) -> Iterator[Page]:
+def pages(data: bytes, limit: int = PAGES) -> Iterator[Page]:
     """The pages of the main chain, in the order of the file."""
     order = "<" if data[:2] == b"II" else ">"
     version = int(np.frombuffer(data, order + "u2", 1, 2)[0])
@@ -94,7 +94,7 @@ def pages(data: bytes) -> Iterator[Page]:
 
     at = integer(offset, 8 if big else 4)
     seen: set[int] = set()
-    while at and len(seen) < _PAGES:
+    while at and len(seen) < limit:
         if at in seen:
             raise ValueError("its pages form a circle")
         seen.add(at)

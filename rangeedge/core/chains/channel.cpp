@@ -14,9 +14,6 @@ constexpr double part_deviations = 4;
 constexpr double least_share = 0.5;          // of the samples of a part, that lie on the line
 constexpr std::ptrdiff_t least_series = 10;  // parts, of whose order one can tell anything
 constexpr double least_roughness = 0.5;      // of residuals in no order: 2, von Neumann's ratio
-constexpr double most_share = 1.6;  // of half a distance of pixels, that a line may lead off to be moved between them
-constexpr double damping = 0.25;
-constexpr int power_rounds = 60;
 constexpr int part_samples = 24, most_parts = 24;
 
 // One pass of least squares over the samples not farther than `most` off the last fit.
@@ -92,38 +89,6 @@ AffineFit fit_affine(const Array<ChannelSample>& samples, double allowed) {
     }
     fit.fits = all_parts_fit(samples, fit, most, allowed);
     return fit;
-}
-
-void pass_between(const Array<ChannelSample>& samples, const Array<double>& halves, AffineFit& fit) {
-    const auto largest_share = [&](const AffineFit& f) {
-        double largest = 0;
-        for (std::ptrdiff_t i = 0; i < samples.size(); ++i)
-            if (halves[i] > 0)
-                largest = std::max(largest, std::abs(samples[i].value - f.at(samples[i].position)) / halves[i]);
-        return largest;
-    };
-    double share = largest_share(fit);
-    if (share > most_share) return;
-    AffineFit next = fit;
-    for (int round = 0; round < power_rounds; ++round) {
-        double w = 0, t = 0, tt = 0, v = 0, tv = 0;
-        for (std::ptrdiff_t i = 0; i < samples.size(); ++i) {
-            if (!(halves[i] > 0)) continue;
-            const double position = samples[i].position - fit.centre;
-            const double off = samples[i].value - next.at(samples[i].position);
-            const double part = off / halves[i], square = part * part;
-            const double weight = (square * square * square + 1e-6) / (halves[i] * halves[i]);
-            w += weight, t += weight * position, tt += weight * position * position;
-            v += weight * off, tv += weight * position * off;
-        }
-        const double determinant = w * tt - t * t;
-        if (!(determinant > 0)) return;
-        // A damped step of Newton's method: the power 8 has a second derivative 7 times that weight.
-        next.value += damping * (tt * v - t * tv) / determinant;
-        next.slope += damping * (w * tv - t * v) / determinant;
-        const double now = largest_share(next);
-        if (now < share) share = now, fit.value = next.value, fit.slope = next.slope;
-    }
 }
 
 void smooth_parabolas(const Array<ChannelSample>& samples, std::ptrdiff_t places, bool closed, int reach,

@@ -24,11 +24,6 @@ struct AffineFit {
 // Robust, by leaving out what lies far off. `allowed` may any part lie aside.
 AffineFit fit_affine(const Array<ChannelSample>& samples, double allowed);
 
-// Without noise a jump passes between the pixels beside each of its candidates, which confines a line much more than their
-// midpoints do. Moves the line to the middle of all that do so, where the largest offset, as a share of half the distance
-// of the pixels across it, is least: the sum of high powers of the shares. Leaves it where one is far off, as in noise.
-void pass_between(const Array<ChannelSample>& samples, const Array<double>& halves, AffineFit& fit);
-
 // The value at each of `places` places, by parabolas over those up to `reach` away. NaN where nothing is known.
 void smooth_parabolas(const Array<ChannelSample>& samples, std::ptrdiff_t places, bool closed, int reach,
                       Array<double>& values);

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "base/angle.hpp"
+#include "base/watch.hpp"
 #include "chains/line_sums.hpp"
 
 namespace rangeedge {
@@ -46,7 +47,8 @@ public:
 
 private:
     void find_ends() {
-        for (int i = 0; i < static_cast<int>(pieces_.size()); ++i)
+        Checkpoints checkpoints(256);
+        for (int i = 0; i < static_cast<int>(pieces_.size()); ++i, checkpoints.pass())
             for (const int side : {0, 1}) ends_.push_back(end(i, side));
     }
 
@@ -87,12 +89,15 @@ private:
                                    static_cast<int>(std::floor(line.x / size)), i);
         }
         std::sort(cells.begin(), cells.end());
-        for (const auto& [row, col, i] : cells)
+        Checkpoints checkpoints(256);
+        for (const auto& [row, col, i] : cells) {
+            checkpoints.pass();
             for (int v = row - 1; v <= row + 1; ++v) {
                 auto other = std::lower_bound(cells.begin(), cells.end(), std::make_tuple(v, col - 1, -1));
                 for (; other != cells.end() && std::get<0>(*other) == v && std::get<1>(*other) <= col + 1; ++other)
                     if (std::get<2>(*other) > i) compare(i, std::get<2>(*other));
             }
+        }
         std::sort(pairs_.begin(), pairs_.end(),
                   [](const Pair& p, const Pair& q) { return std::tie(p.cost, p.a, p.b) < std::tie(q.cost, q.a, q.b); });
     }

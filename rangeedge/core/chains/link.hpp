@@ -1,5 +1,5 @@
-// Edges as geometry: candidates joined along the map of thin lines into ordered chains of points, each with its place in
-// the image and on the image plane, and what either surface is like there.
+// Edges as geometry: candidates joined along the map of thin lines into ordered chains of points, each with its place
+// in the image and on the image plane, and what either surface is like there.
 //
 //   trace    the lines of the map become paths without branches (trace.hpp)
 //   divide   paths end where the kind of edge changes (pieces.hpp)

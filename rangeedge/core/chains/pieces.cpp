@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/watch.hpp"
 #include "edges/neighbourhood.hpp"
 
 namespace rangeedge {
@@ -44,7 +45,11 @@ public:
         : candidates_(candidates), tracing_(tracing), crossings_(crossings), kinds_(kinds), cols_(cols) {}
 
     std::vector<Piece> divide() {
-        for (const LinePath& path : tracing_.paths) divide(path);
+        Checkpoints checkpoints(64);
+        for (const LinePath& path : tracing_.paths) {
+            checkpoints.pass();
+            divide(path);
+        }
         return std::move(pieces_);
     }
 
@@ -112,7 +117,9 @@ Crossings assign_candidates(const std::vector<Candidate>& candidates, const Trac
     Array<std::int32_t> nearest(static_cast<std::ptrdiff_t>(candidates.size()), -1);
     Crossings result;
     result.first.resize(tracing.pixels.size() + 1, 0);
+    Checkpoints checkpoints;
     for (std::ptrdiff_t i = 0; i < nearest.size(); ++i) {
+        checkpoints.pass();
         const Candidate& c = candidates[static_cast<std::size_t>(i)];
         // The line along a jump lies on its nearer side, which a smeared step is far from.
         const std::int32_t near = c.kind & occluding_bit ? c.before : c.after;
@@ -132,8 +139,10 @@ Crossings assign_candidates(const std::vector<Candidate>& candidates, const Trac
     std::partial_sum(result.first.begin(), result.first.end(), result.first.begin());
     result.candidates.resize(result.first.back(), 0);
     Array<std::int32_t> next = result.first;
-    for (std::ptrdiff_t i = 0; i < nearest.size(); ++i)
+    for (std::ptrdiff_t i = 0; i < nearest.size(); ++i) {
+        checkpoints.pass();
         if (nearest[i] >= 0) result.candidates[next[nearest[i]]++] = static_cast<std::int32_t>(i);
+    }
     return result;
 }
 

@@ -1,8 +1,7 @@
 // Pieces of paths along which an edge stays the same: one kind, the nearer surface on one side.
 //
-// Every candidate belongs to the pixel of a path that is nearest to it. The candidates near a pixel that are jumps where
-// it is one, and creases elsewhere, vote for its class;
-// where that changes, a piece ends.
+// Every candidate belongs to the pixel of a path that is nearest to it. The candidates near a pixel that are jumps
+// where it is one, and creases elsewhere, vote for its class; where that changes, a piece ends.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstddef>

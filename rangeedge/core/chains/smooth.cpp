@@ -7,6 +7,7 @@
 
 #include "chains/channel.hpp"
 #include "chains/line_sums.hpp"
+#include "chains/separation.hpp"
 
 namespace rangeedge {
 namespace {
@@ -15,7 +16,6 @@ constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double jump_aside = 0.5, crease_aside = 0.03;  // pixels that a part of a straight chain may lie aside
 constexpr double ordinate_aside = 3e-5;                  // of ordinates, as a share
 constexpr double least_squared_sine = 0.05;              // of a scan line with a jump, in its weight
-constexpr double least_half = 0.1;                       // pixels across a jump that its candidates confine it to
 constexpr int end_places = 4;
 constexpr double largest_precision = 1e30;           // of a slope
 constexpr int position_reach = 12, least_reach = 4;  // pixels on either side of a parabola
@@ -24,7 +24,8 @@ constexpr int gradient_rounds = 2;
 constexpr int tangent_reach = 3;  // pixels
 constexpr double reach_per_radius = 0.5;
 constexpr std::ptrdiff_t most_frayed = 6, fray_reach = 16;  // positions at an end, and inside of them
-constexpr double least_fray = 0.8, fray_deviations = 3;     // pixels; standard deviations
+constexpr std::ptrdiff_t least_share_inside = 5;
+constexpr double least_fray = 0.8, fray_deviations = 3;  // pixels; standard deviations
 
 struct Sample {
     const Candidate* candidate;
@@ -147,6 +148,7 @@ private:
         for (const bool last : {false, true}) {
             channel_.clear();
             for (const Sample& s : samples_) {
+                if (beside_corner(s)) continue;
                 const double x = static_cast<double>(s.candidate->x), y = static_cast<double>(s.candidate->y);
                 channel_.push_back({s.place, line.along(x, y), line.off(x, y), weight(s, line)});
             }
@@ -160,12 +162,10 @@ private:
         }
         if (!fit.fits) return false;
         result_.straight = true;
-        if (jumps_) pass_between(channel_, half_distances(line), fit);
-        positions_.assign(places(), 0);
-        Array<double> weights(places(), 0);
-        for (const ChannelSample& s : channel_) positions_[s.place] += s.position, weights[s.place] += 1;
+        if (jumps_) separate(pixel_pairs(line), fit);
+        positions_.resize(places());
         for (std::ptrdiff_t k = 0; k < places(); ++k) {
-            const double t = positions_[k] / weights[k], off = fit.at(t);
+            const double t = line.along(means_[k].x, means_[k].y), off = fit.at(t);
             positions_[k] = t;
             point(k).x = line.x + t * line.dx - off * line.dy;
             point(k).y = line.y + t * line.dy + off * line.dx;
@@ -173,17 +173,27 @@ private:
         return true;
     }
 
-    // Half the distance across the line between the pixels beside each candidate of a jump; 0 where that tells nothing.
-    Array<double> half_distances(const StraightLine& line) const {
-        Array<double> halves(samples_.size(), 0);
-        for (std::ptrdiff_t i = 0; i < samples_.size(); ++i) {
-            const Candidate& c = *samples_[i].candidate;
-            const double x = c.after % frame_.cols - c.before % frame_.cols;
-            const double y = c.after / frame_.cols - c.before / frame_.cols;
-            const double half = std::abs(y * line.dx - x * line.dy) / 2;
-            if (inside(samples_[i]) && half > least_half) halves[i] = half;
+    // The pixels beside each candidate of a jump, on the two sides of a line.
+    Array<PixelPair> pixel_pairs(const StraightLine& line) const {
+        Array<PixelPair> pairs;
+        for (const Sample& s : samples_) {
+            const auto place = [&](std::int32_t pixel) {
+                const double x = pixel % frame_.cols, y = pixel / frame_.cols;
+                return Point{line.along(x, y), line.off(x, y)};
+            };
+            const Point p = place(s.candidate->before), q = place(s.candidate->after);
+            const bool before_nearer = (s.candidate->kind & occluding_bit) != 0;
+            const Point &near = before_nearer ? p : q, &far = before_nearer ? q : p;
+            // The nearer surface is on the left, where offsets are negative.
+            if (far.y > near.y) pairs.push_back({far.x, far.y, near.x, near.y});
         }
-        return halves;
+        return pairs;
+    }
+
+    // There scan lines are short, and bend creases.
+    bool beside_corner(const Sample& s) const {
+        const std::ptrdiff_t reach = std::min(most_frayed, places() / least_share_inside);
+        return !jumps_ && (s.place < reach || s.place >= places() - reach);
     }
 
     double weight(const Sample& s, const StraightLine& line) const {
@@ -277,12 +287,18 @@ private:
         return frame_.projective ? 1 / along : -along;
     }
 
+    // The share of a length on the line of sight that lies along the axis, where jumps are measured on that.
+    double along_axis(std::int32_t pixel) const {
+        if (!frame_.ranges) return 1;
+        return 1 / (std::abs(ordinate_at(pixel)) * length(frame_.point(pixel)));
+    }
+
     // Of a surface beside an edge, moved along the scan line to where the candidate was moved.
     double ordinate(const Sample& s, int side) const {
         const Candidate& c = *s.candidate;
         if (!has_sides(c)) {
             const double near = ordinate_at(c.kind & occluding_bit ? c.before : c.after),
-                         jump = static_cast<double>(c.jump);
+                         jump = static_cast<double>(c.jump) * along_axis(c.before);
             if (side == 0) return near;
             return frame_.projective ? 1 / (1 / near + jump) : near - jump;
         }

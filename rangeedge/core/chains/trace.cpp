@@ -4,6 +4,8 @@
 #include <cstring>
 #include <utility>
 
+#include "base/watch.hpp"
+
 namespace rangeedge {
 namespace {
 
@@ -23,7 +25,9 @@ public:
         const std::ptrdiff_t size = std::ptrdiff_t{rows_} * cols_;
         result_.place.resize(size, empty);
         Array<std::int32_t> lines;
+        Checkpoints checkpoints;
         for (std::ptrdiff_t p = 0; p < size; ++p) {
+            checkpoints.pass();
             std::uint64_t eight;
             if (p + 8 <= size && (std::memcpy(&eight, thin_ + p, 8), eight == 0)) {
                 p += 7;
@@ -32,10 +36,14 @@ public:
             if (thin_[p]) lines.push_back(static_cast<std::int32_t>(p));
         }
         for (const std::int32_t p : lines) result_.place[p] = count(neighbours(p)) > 2 ? junction : unvisited;
-        for (const std::int32_t p : lines)
+        for (const std::int32_t p : lines) {
+            checkpoints.pass();
             if (result_.place[p] == unvisited && open_ends(p) < 2) follow(p);
-        for (const std::int32_t p : lines)
+        }
+        for (const std::int32_t p : lines) {
+            checkpoints.pass();
             if (result_.place[p] == unvisited) follow(p);
+        }
         return std::move(result_);
     }
 

@@ -100,9 +100,13 @@ public:
     void start_at(std::int32_t p) { length_[at(p)] = terrain_.length(terrain_.offset(p, labels_[at(p)])); }
 
     void settle() {
-        for (std::int32_t p = 0; p < static_cast<std::int32_t>(length_.size()); ++p)
+        Checkpoints checkpoints(256);
+        for (std::int32_t p = 0; p < static_cast<std::int32_t>(length_.size()); ++p) {
+            checkpoints.pass();
             if (std::isfinite(length_[at(p)]) && borders_on_shadow(p)) queue_.emplace(length_[at(p)], p);
+        }
         while (!queue_.empty()) {
+            checkpoints.pass();
             const auto [length, p] = queue_.top();
             queue_.pop();
             if (length > length_[at(p)]) continue;
@@ -181,8 +185,11 @@ void geodesic_transform(const std::uint8_t* edges, const std::uint8_t* barrier, 
             lit[p] = !walls[p] && nearest[p] >= 0 && terrain.in_sight(static_cast<std::int32_t>(p), nearest[p]);
     });
     Shadows shadows(terrain, grid, nearest);
-    for (std::size_t p = 0; p < count; ++p)
+    Checkpoints checkpoints;
+    for (std::size_t p = 0; p < count; ++p) {
+        checkpoints.pass();
         if (lit[p]) shadows.start_at(static_cast<std::int32_t>(p));
+    }
     shadows.settle();
     for (std::size_t p = 0; p < count; ++p) {
         const double length = shadows.length(static_cast<std::int32_t>(p));

@@ -190,6 +190,7 @@ private:
     Block grow(Branch& branch, int level, int y, int x, Moments& moments) const {
         if (y >= grid_.rows || x >= grid_.cols + beyond_) return {};
         if (level == 0) return smallest_block(branch.sources, y, x, moments);
+        Watch::checkpoint();
         const int half = tile_size << (level - 1);
         Block whole, parts[group_size];
         for (int k = 0; k < group_size; ++k) {

@@ -7,6 +7,7 @@
 #include <numeric>
 #include <vector>
 
+#include "base/watch.hpp"
 #include "edges/candidate.hpp"
 
 namespace rangeedge {
@@ -22,14 +23,22 @@ public:
 
     // All candidates are counted before the first one is assigned its place.
     void count(const std::vector<Candidate>& candidates) {
-        for (const Candidate& c : candidates) ++end_[cell_of(c) + 1];
+        Checkpoints checkpoints;
+        for (const Candidate& c : candidates) {
+            checkpoints.pass();
+            ++end_[cell_of(c) + 1];
+        }
     }
     // Calls visit(candidate, its place) for all, which in a cell are in the order they come.
     template <class Visit>
     void assign(const std::vector<Candidate>& candidates, Visit&& visit) {
         if (!counted_) std::partial_sum(end_.begin(), end_.end(), end_.begin());
         counted_ = true;
-        for (const Candidate& c : candidates) visit(c, static_cast<std::size_t>(end_[cell_of(c)]++));
+        Checkpoints checkpoints;
+        for (const Candidate& c : candidates) {
+            checkpoints.pass();
+            visit(c, static_cast<std::size_t>(end_[cell_of(c)]++));
+        }
     }
 
     int rows() const { return rows_; }

@@ -13,6 +13,7 @@
 #include "edges/shadow.hpp"
 #include "edges/smear.hpp"
 #include "edges/strength.hpp"
+#include "edges/trace.hpp"
 #include "scanline/approximation.hpp"
 #include "scanline/reader.hpp"
 
@@ -33,8 +34,10 @@ struct Found {
 template <class T>
 class LineDetector {
 public:
-    LineDetector(const Frame<T>& frame, const ScanLineOptions& options, int direction)
-        : options_(options), reader_(frame, options), direction_(direction) {}
+    // `trace`, unless null, receives the cuts with what their tests compare.
+    LineDetector(const Frame<T>& frame, const ScanLineOptions& options, int direction,
+                 std::vector<CutTrace>* trace = nullptr)
+        : options_(options), reader_(frame, options), direction_(direction), trace_(trace) {}
 
     void read(int first, int count, Strip<T>& strip) const { reader_.read(direction_, first, count, strip); }
 
@@ -76,13 +79,19 @@ private:
         const double x = (line.abscissa(step.before) + line.abscissa(step.after)) / 2;
         const Position edge{step.before, step.after, x, (step.before + step.after) / 2.0, 0, false};
         const int samples = a.segments[step.next].first - a.segments[i].last;
+        const std::size_t traced = trace_ ? trace_->size() : 0;
         candidate = step.gap > options_.max_gap ? measure_outline(line, a, i, step.next, step.before, step.after)
                                                 : measure(line, a, i, step.next, edge, samples);
-        if (!(candidate.kind & jump_bit)) return i;
+        if (!(candidate.kind & jump_bit)) {
+            if (trace_) trace_->resize(traced);
+            return i;
+        }
         // The middle of the ramp is where the rim of the nearer surface is.
         const double middle = (line.abscissa(step.low) + line.abscissa(step.high)) / 2;
         locate(candidate, line, {step.low, step.high, middle, (step.low + step.high) / 2.0, 0, false});
         candidate.smeared = true;
+        if (trace_)
+            trace_->back().smeared = 1, trace_->back().cut = trace_->back().sample = (step.low + step.high) / 2.0;
         for (int k = step.before + 1; k < step.after; ++k)
             if (line.ordinate(k) == line.ordinate(k)) smeared.push_back(static_cast<std::int32_t>(line.pixel(k)));
         return step.next;
@@ -93,7 +102,17 @@ private:
                               int before, int after) const {
         if (!options_.shadows) return {};
         const ShadowStep step = step_across_shadow(line, a.fit(i), a.fit(j), before, after, options_.spaced);
-        if (!is_jump(line, before, after, step.difference, step.difference / step.deviation)) return {};
+        const bool jumps = is_jump(line, before, after, step.difference, step.difference / step.deviation);
+        if (trace_) {
+            CutTrace t{};
+            t.cut = t.sample = step.before_nearer ? before + 0.5 : after - 0.5;
+            t.before = before, t.after = after, t.jump = step.jump, t.difference = step.difference;
+            t.tolerance = std::max(line.tolerance_at(before), line.tolerance_at(after));
+            t.jump_single = step.difference / step.deviation, t.jump_shared = step.difference / step.shared_deviation;
+            t.jumps = t.candidate = jumps, t.outline = 1;
+            trace_->push_back(t);
+        }
+        if (!jumps) return {};
         Candidate c{};
         c.jump = within_range(std::min(step.jump, largest_jump(line, before, after)));
         c.significance = std::min(static_cast<float>(step.difference / step.shared_deviation), endless);
@@ -133,15 +152,28 @@ private:
         const FitDeviation of_crease = crease_deviation(f1, slope1, f2, slope2);
         const double difference = std::abs(f1.ordinate - f2.ordinate);
         double jump_significance = difference / of_jump.shared, crease_significance = crease / of_crease.shared;
+        const double seen_jump = jump, seen_crease = crease;
         const double least = std::min(lone_significance, options_.min_significance);
         if (!std::isfinite(jump) || !(difference >= least * of_jump.single)) jump = jump_significance = 0;
         if (!std::isfinite(crease) || !(crease >= least * of_crease.single)) crease = crease_significance = 0;
         bool jumps = jump > 0 && is_jump(line, edge.before, edge.after, difference, difference / of_jump.single);
-        if (jumps && is_smooth(line, edge.before, edge.after, steps, difference))
-            jump = jump_significance = 0, jumps = false;
+        const bool smooth = jumps && is_smooth(line, edge.before, edge.after, steps, difference);
+        if (smooth) jump = jump_significance = 0, jumps = false;
         const double step = (line.abscissa(edge.after) - line.abscissa(edge.before)) / (edge.after - edge.before);
-        if (jumps || bends_smoothly(line, edge.before, edge.after, std::abs(f1.slope - f2.slope) * step))
-            crease = crease_significance = 0;
+        const bool bends = bends_smoothly(line, edge.before, edge.after, std::abs(f1.slope - f2.slope) * step);
+        if (jumps || bends) crease = crease_significance = 0;
+        if (trace_) {
+            CutTrace t{};
+            t.cut = edge.sample - edge.shift, t.sample = edge.sample;
+            t.before = edge.before, t.after = edge.after, t.jump = seen_jump, t.crease = seen_crease;
+            t.difference = difference;
+            t.tolerance = std::max(line.tolerance_at(edge.before), line.tolerance_at(edge.after));
+            t.jump_single = difference / of_jump.single, t.jump_shared = difference / of_jump.shared;
+            t.crease_single = seen_crease / of_crease.single, t.crease_shared = seen_crease / of_crease.shared;
+            t.jumps = jumps, t.smooth = smooth, t.bends = bends, t.convex = is_convex(f1, f2);
+            t.candidate = jump > 0 || crease > 0;
+            trace_->push_back(t);
+        }
 
         Candidate c{};
         c.jump = within_range(jump);
@@ -197,6 +229,7 @@ private:
     const ScanLineOptions& options_;
     LineReader<T> reader_;
     int direction_;
+    std::vector<CutTrace>* trace_;
 };
 
 // Neighbouring lines of one direction, and the candidates on them.
@@ -218,11 +251,18 @@ std::vector<Part> parts_of(int directions, int rows, int cols) {
 // Leaves no candidates on smeared pixels. Every direction has a chance to find these.
 void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, std::uint8_t* smeared) {
     std::vector<std::int32_t> pixels;
-    for (const Part& part : parts) pixels.insert(pixels.end(), part.found.smeared.begin(), part.found.smeared.end());
+    Checkpoints checkpoints(64);
+    for (const Part& part : parts) {
+        checkpoints.pass();
+        pixels.insert(pixels.end(), part.found.smeared.begin(), part.found.smeared.end());
+    }
     int count = 0;
     for (const int direction : all_directions) count += (directions & direction) != 0;
     const SmearMask mask(rows, cols, pixels, count);
-    for (Part& part : parts) mask.clear_of_candidates(part.found.candidates);
+    for (Part& part : parts) {
+        checkpoints.pass();
+        mask.clear_of_candidates(part.found.candidates);
+    }
     if (smeared) mask.write(smeared);
 }
 
@@ -230,7 +270,7 @@ void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, s
 
 template <class T>
 std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, int threads,
-                                       std::uint8_t* smeared) {
+                                       std::uint8_t* smeared, std::vector<Candidate>* weak) {
     std::vector<Part> parts = parts_of(options.directions, frame.rows, frame.cols);
     constexpr int parts_per_thread = 8;  // for fewer another thread is not worth starting
     Team team(std::min(threads, 1 + static_cast<int>(parts.size()) / parts_per_thread));
@@ -241,6 +281,7 @@ std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOpti
         Approximator<T> approximator(options);
         Found found;
         for (std::size_t i; (i = taken++) < parts.size();) {
+            Watch::checkpoint();
             Part& part = parts[i];
             const LineDetector<T> detector(frame, options, part.direction);
             detector.read(part.first, part.count, strip);
@@ -256,19 +297,66 @@ std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOpti
     std::vector<Candidate> candidates(static_cast<std::size_t>(order));
     Cells cells(frame.rows, frame.cols);
     for (const Part& part : parts) cells.count(part.found.candidates);
-    for (const Part& part : parts)
+    for (const Part& part : parts) {
+        Watch::checkpoint();
         cells.assign(part.found.candidates, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
+    }
     parts.clear();
-    join_neighbours(candidates, frame, options, team);
+    join_neighbours(candidates, frame, options, team, weak);
     return candidates;
 }
 
-void put_in_order(std::vector<Candidate>& candidates) {
-    std::sort(candidates.begin(), candidates.end(),
-              [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
+template <class T>
+LineTrace trace_line(const Frame<T>& frame, const ScanLineOptions& options, int direction, int col, int row) {
+    LineTrace trace;
+    const LineDetector<T> detector(frame, options, direction, &trace.cuts);
+    Strip<T> strip;
+    Approximator<T> approximator(options);
+    Found found;
+    const auto passes = [&](int i) {
+        const Path p = line_path(direction, i, frame.rows, frame.cols);
+        const int k = p.dcol ? (col - p.col) * p.dcol : (row - p.row) * p.drow;
+        return k >= 0 && k < p.size && p.col + k * p.dcol == col && p.row + k * p.drow == row;
+    };
+    int index = 0;
+    while (!passes(index)) ++index;
+    detector.read(index, 1, strip);
+    detector.detect(strip, approximator, found);
+    const Line<T>& line = strip.lines.front();
+    for (int k = 0; k < line.path.size; ++k) {
+        const double x = line.abscissa(k), y = line.ordinate(k), tolerance = line.tolerance_at(k);
+        const double z = line.depth(y, x), off = std::abs(line.depth(y + tolerance, x) - z);
+        trace.samples.push_back({double(line.path.col + k * line.path.dcol), double(line.path.row + k * line.path.drow),
+                                 x, y, z, NAN, NAN, tolerance, off});
+    }
+    const Approximation a = approximator.line(0);
+    for (std::ptrdiff_t i = 0; i < a.count; ++i) {
+        const Segment& s = a.segments[i];
+        const Curve& f = a.curves[i];
+        trace.segments.push_back(
+            {double(s.first), double(s.last), f.mean, f.c2, f.c1 - f.alpha * f.c2, f.base + f.c0 - f.beta * f.c2});
+        for (int k = s.first; k <= s.last; ++k) {
+            SampleTrace& sample = trace.samples[static_cast<std::size_t>(k)];
+            sample.fitted = f.value(sample.abscissa);
+            sample.fitted_depth = line.depth(sample.fitted, sample.abscissa);
+        }
+    }
+    return trace;
 }
 
-template std::vector<Candidate> find_candidates(const Frame<float>&, const ScanLineOptions&, int, std::uint8_t*);
-template std::vector<Candidate> find_candidates(const Frame<double>&, const ScanLineOptions&, int, std::uint8_t*);
+void put_in_order(std::vector<Candidate>& candidates) {
+    Checkpoints checkpoints;
+    std::sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
+        checkpoints.pass();
+        return a.order < b.order;
+    });
+}
+
+#define RANGEEDGE_INSTANTIATE(T)                                                                                 \
+    template std::vector<Candidate> find_candidates(const Frame<T>&, const ScanLineOptions&, int, std::uint8_t*, \
+                                                    std::vector<Candidate>*);                                    \
+    template LineTrace trace_line(const Frame<T>&, const ScanLineOptions&, int, int, int);
+RANGEEDGE_INSTANTIATE(float)
+RANGEEDGE_INSTANTIATE(double)
 
 }  // namespace rangeedge

@@ -42,7 +42,11 @@ public:
     // Calls visit(index of a candidate, its place in the arrays) for all.
     template <class Visit>
     void for_each(Visit&& visit) const {
-        for (std::size_t k = 0; k < order_.size(); ++k) visit(static_cast<std::size_t>(order_[k]), k);
+        Checkpoints checkpoints;
+        for (std::size_t k = 0; k < order_.size(); ++k) {
+            checkpoints.pass();
+            visit(static_cast<std::size_t>(order_[k]), k);
+        }
     }
 
     // A candidate and the places, in three rows of cells, where its neighbours are.
@@ -58,8 +62,10 @@ public:
     void for_each_near(Team& team, Visit&& visit) const {
         std::atomic<int> taken{0};
         team.run([&](int) {
-            for (int row; (row = taken++) < cells_.rows();)
+            for (int row; (row = taken++) < cells_.rows();) {
+                Watch::checkpoint();
                 for (int col = 0; col < cells_.cols(); ++col) visit_cell(col, row, visit);
+            }
         });
     }
 

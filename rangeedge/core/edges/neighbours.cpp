@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 
 #include "edges/align.hpp"
 #include "edges/neighbourhood.hpp"
@@ -35,10 +36,16 @@ RANGEEDGE_VERSIONS(float, evidence, (const NeighbourGrid::Near& near), (near))
 
 template <class T>
 void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, const ScanLineOptions& options,
-                     Team& team) {
+                     Team& team, std::vector<Candidate>* weak_ones) {
     const auto least = static_cast<float>(options.min_significance);
     const bool aligned = options.max_shift > 0;
     if (!(least > 0 || aligned || options.normals)) return;
+    Checkpoints checkpoints;
+    const auto weak = [&](const Candidate& c) { return c.significance < least; };
+    const auto goes = [&](const Candidate& c) {
+        checkpoints.pass();
+        return weak(c);
+    };
     {
         NeighbourGrid grid(candidates, frame.rows, frame.cols, evidence_field + 1);
         grid.for_each([&](std::size_t i, std::size_t k) {
@@ -50,8 +57,8 @@ void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, 
             c.significance = std::max(std::sqrt(evidence(near)), c.significance * lone_share);
         });
     }
-    const auto weak = [&](const Candidate& c) { return c.significance < least; };
-    candidates.erase(std::remove_if(candidates.begin(), candidates.end(), weak), candidates.end());
+    if (weak_ones) std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(*weak_ones), weak);
+    candidates.erase(std::remove_if(candidates.begin(), candidates.end(), goes), candidates.end());
     for (const double max_spreads : alignments) {
         if (!aligned) break;
         const NeighbourGrid grid(candidates, frame.rows, frame.cols, first_field);
@@ -68,7 +75,9 @@ void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, 
     });
 }
 
-template void join_neighbours(std::vector<Candidate>&, const Frame<float>&, const ScanLineOptions&, Team&);
-template void join_neighbours(std::vector<Candidate>&, const Frame<double>&, const ScanLineOptions&, Team&);
+template void join_neighbours(std::vector<Candidate>&, const Frame<float>&, const ScanLineOptions&, Team&,
+                              std::vector<Candidate>*);
+template void join_neighbours(std::vector<Candidate>&, const Frame<double>&, const ScanLineOptions&, Team&,
+                              std::vector<Candidate>*);
 
 }  // namespace rangeedge

@@ -20,8 +20,9 @@
 
 namespace rangeedge {
 
+// `weak`, unless null, receives those dropped.
 template <class T>
 void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, const ScanLineOptions& options,
-                     Team& team);
+                     Team& team, std::vector<Candidate>* weak);
 
 }  // namespace rangeedge

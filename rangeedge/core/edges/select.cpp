@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "base/watch.hpp"
 #include "image/components.hpp"
 
 namespace rangeedge {
@@ -12,51 +13,68 @@ namespace {
 
 constexpr double usual_length = 10;  // of the line whose significance is that of its pixels
 
-// An image with the margin of one pixel that components need.
-struct Framed {
+// An edge map, 0 and 1, with the margin of one pixel that components need.
+struct EdgeMap {
     int rows, cols;
+    bool wrap;
     std::size_t stride;
     std::vector<std::uint8_t> pixels;
 
-    Framed(int image_rows, int image_cols)
-        : rows(image_rows), cols(image_cols), stride(static_cast<std::size_t>(cols) + 2),
+    EdgeMap(int map_rows, int map_cols, bool wrapped)
+        : rows(map_rows), cols(map_cols), wrap(wrapped), stride(static_cast<std::size_t>(cols) + 2),
           pixels(stride * (static_cast<std::size_t>(rows) + 2), 0) {}
 
     std::uint8_t* row(int i) { return pixels.data() + stride * (static_cast<std::size_t>(i) + 1) + 1; }
-    Components components() const { return Components(pixels.data(), rows, cols, 8); }
+    const std::uint8_t* row(int i) const { return pixels.data() + stride * (static_cast<std::size_t>(i) + 1) + 1; }
+    Components components() const { return Components(pixels.data(), rows, cols, 8, wrap); }
 };
 
-// The longer side of a bounding box.
-struct Box {
-    int left, right = -1, top, bottom = -1;
+// The length of a line: the longer side of its bounding box, or the number of its columns where the map wraps.
+class Extent {
+public:
+    explicit Extent(const EdgeMap& map)
+        : wrap_(map.wrap), left_(map.cols), top_(map.rows), seen_(wrap_ ? static_cast<std::size_t>(map.cols) : 0, 0) {}
 
-    Box(int rows, int cols) : left(cols), top(rows) {}
     void add(int row, int first, int last) {
-        left = std::min(left, first), right = std::max(right, last);
-        top = std::min(top, row), bottom = std::max(bottom, row);
+        left_ = std::min(left_, first), right_ = std::max(right_, last);
+        top_ = std::min(top_, row), bottom_ = std::max(bottom_, row);
+        if (wrap_) std::fill(seen_.begin() + first, seen_.begin() + last + 1, std::uint8_t{1});
     }
-    int length() const { return std::max(right - left, bottom - top) + 1; }
+    int length() const {
+        const int wide = wrap_ ? static_cast<int>(std::count(seen_.begin(), seen_.end(), 1)) : right_ - left_ + 1;
+        return std::max(wide, bottom_ - top_ + 1);
+    }
+
+private:
+    bool wrap_;
+    int left_, right_ = -1, top_, bottom_ = -1;
+    std::vector<std::uint8_t> seen_;
 };
 
 // Each pixel with the eight around it.
-Framed widened(Framed& edges) {
-    Framed wide(edges.rows, edges.cols);
+EdgeMap widened(const EdgeMap& edges) {
+    EdgeMap wide(edges.rows, edges.cols, edges.wrap);
+    const int last = edges.cols - 1;
     for (int row = 0; row < edges.rows; ++row) {
+        Watch::checkpoint();
         const std::uint8_t* from = edges.row(row);
         for (int near = std::max(0, row - 1); near <= std::min(edges.rows - 1, row + 1); ++near) {
             std::uint8_t* to = wide.row(near);
-            for (int col = 0; col < edges.cols; ++col)
+            for (int col = 0; col <= last; ++col)
                 to[col] = static_cast<std::uint8_t>(to[col] | from[col - 1] | from[col] | from[col + 1]);
+            if (edges.wrap && edges.cols > 0) to[0] |= from[last], to[last] |= from[0];
         }
     }
     return wide;
 }
 
-// Removes the lines, whose pieces may lie a few pixels apart, that are not significant.
-void drop_faint(Framed& edges, const float* significance, double least) {
+// Removes the lines that are not significant. Their pieces may lie a few pixels apart.
+void drop_faint(EdgeMap& edges, const float* significance, double least) {
     const Components lines = widened(edges).components();
+    Checkpoints checkpoints;
     for (int i = 0; i < lines.count(); ++i) {
-        Box box(edges.rows, edges.cols);
+        checkpoints.pass();
+        Extent extent(edges);
         double squares = 0, pixels = 0;
         const auto for_each_pixel = [&](auto&& visit) {
             for (const auto [begin, end] : lines.runs(i)) {
@@ -68,31 +86,33 @@ void drop_faint(Framed& edges, const float* significance, double least) {
         };
         for_each_pixel([&](int row, int col, std::uint8_t) {
             const auto s = static_cast<double>(significance[static_cast<std::ptrdiff_t>(row) * edges.cols + col]);
-            box.add(row, col, col);
+            extent.add(row, col, col);
             squares += s * s, pixels += 1;
         });
-        if (squares * box.length() >= least * least * usual_length * pixels) continue;
+        if (squares * extent.length() >= least * least * usual_length * pixels) continue;
         for_each_pixel([](int, int, std::uint8_t& own) { own = 0; });
     }
 }
 
 }  // namespace
 
-void keep_lines(const std::uint8_t* edges, int rows, int cols, int min_length, const float* significance,
+void keep_lines(const std::uint8_t* edges, int rows, int cols, bool wrap, int min_length, const float* significance,
                 double least_significance, std::uint8_t* kept) {
-    Framed image(rows, cols);
+    EdgeMap map(rows, cols, wrap);
     const auto width = static_cast<std::ptrdiff_t>(cols);
     for (int row = 0; row < rows; ++row)
-        std::transform(edges + row * width, edges + (row + 1) * width, image.row(row),
+        std::transform(edges + row * width, edges + (row + 1) * width, map.row(row),
                        [](std::uint8_t edge) { return static_cast<std::uint8_t>(edge != 0); });
-    if (significance && least_significance > 0) drop_faint(image, significance, least_significance);
+    if (significance && least_significance > 0) drop_faint(map, significance, least_significance);
     std::fill_n(kept, rows * width, std::uint8_t{0});
-    const Components pieces = image.components();
+    const Components pieces = map.components();
+    Checkpoints checkpoints;
     for (int i = 0; i < pieces.count(); ++i) {
-        Box box(rows, cols);
+        checkpoints.pass();
+        Extent extent(map);
         for (const auto [begin, end] : pieces.runs(i))
-            box.add(pieces.row_of(begin), pieces.col_of(begin), pieces.col_of(end - 1));
-        if (box.length() < min_length) continue;
+            extent.add(pieces.row_of(begin), pieces.col_of(begin), pieces.col_of(end - 1));
+        if (extent.length() < min_length) continue;
         for (const auto [begin, end] : pieces.runs(i))
             std::fill_n(kept + pieces.row_of(begin) * width + pieces.col_of(begin), end - begin, std::uint8_t{1});
     }

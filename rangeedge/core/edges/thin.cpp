@@ -28,6 +28,8 @@
 #include <tuple>
 #include <vector>
 
+#include "base/watch.hpp"
+
 namespace rangeedge {
 namespace {
 
@@ -112,6 +114,7 @@ public:
                 ++enclosed;
         });
         while (!border.empty()) {
+            Watch::checkpoint();
             layers_ = std::min(layers_ + 1, 255);
             for (const int p : border) {
                 layer_[at(p)] = static_cast<std::uint8_t>(layers_);
@@ -158,7 +161,10 @@ public:
     }
 
     void draw_ends(int spur_length) {
-        for (const int end : ends()) draw_end(end, spur_length);
+        for (const int end : ends()) {
+            checkpoints_.pass();
+            draw_end(end, spur_length);
+        }
     }
 
     void write(std::uint8_t* thin) const {
@@ -231,6 +237,7 @@ private:
         for (const int p : pixels) offer(p);
         std::vector<int> group, side;
         for (; waiting > 0; waiting -= group.size()) {
+            checkpoints_.pass();
             while (by_depth_[least].empty()) ++least;
             group.clear();
             group.swap(by_depth_[least]);
@@ -239,6 +246,7 @@ private:
                 for (const int p : group)
                     if (!is_set(p + offsets_[at(from)]) && from_here(ring<on>(p), from)) side.push_back(p);
                 for (const int p : side) {
+                    checkpoints_.pass();
                     if (!is_set(p) || !kinds[ring<on>(p)].may_go()) continue;
                     state_[at(p)] = 0;
                     for_each_neighbour(p, offer);
@@ -296,9 +304,13 @@ private:
             for (const int p : spur.pixels) sum += depth(p);
             spurs.emplace(protrusion(spur), sum, end);
         };
-        for (const int end : ends()) offer(end, branch(end, limit));
+        for (const int end : ends()) {
+            checkpoints_.pass();
+            offer(end, branch(end, limit));
+        }
         bool removed = false;
         while (!spurs.empty()) {
+            checkpoints_.pass();
             const auto [length, sum, end] = spurs.top();
             spurs.pop();
             if (!is_set(end) || count_neighbours(end) != 1) continue;
@@ -388,6 +400,7 @@ private:
         return drawn;
     }
 
+    Checkpoints checkpoints_;
     int rows_, cols_, stride_;
     std::array<int, 8> offsets_;       // of the neighbours, as in a ring
     std::vector<std::uint8_t> state_;  // with a margin of one pixel, all 0

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/disjoint_sets.hpp"
+#include "base/watch.hpp"
 
 namespace rangeedge {
 
@@ -30,14 +31,15 @@ public:
         const Run* end() const { return last; }
     };
 
-    // `connectivity` is 4 or 8.
+    // `connectivity` is 4 or 8; `wrap` says that the first column follows the last.
     template <class T>
-    Components(const T* image, int rows, int cols, int connectivity = 4) : stride_(cols + 2) {
+    Components(const T* image, int rows, int cols, int connectivity = 4, bool wrap = false) : stride_(cols + 2) {
         const int stride = stride_, reach = connectivity == 8;
         std::vector<Run> found;
         DisjointSets sets;      // of runs; the first in raster order represents each
         std::size_t above = 0;  // first run that may touch the next one from the row above
         for (int row = 0; row < rows; ++row) {
+            Watch::checkpoint();
             const std::size_t row_begin = found.size();
             int p = (row + 1) * stride + 1;
             for (const int end = p + cols; (p = find_value(image, p, end)) < end;) {
@@ -51,13 +53,12 @@ public:
                 while (above < row_begin && found[above].end + stride + reach <= run.begin) ++above;
                 for (std::size_t k = above; k < row_begin && found[k].begin + stride < run.end + reach; ++k) {
                     if (image[found[k].begin] != value) continue;
-                    const auto [low, high] =
-                        std::minmax({sets.find(static_cast<int>(k)), sets.find(static_cast<int>(i))});
-                    sets.link(high, low);
+                    join(sets, k, i);
                 }
             }
             above = row_begin;
         }
+        if (wrap) join_around(image, rows, cols, reach, found, sets);
         sort(found, sets);
     }
 
@@ -83,9 +84,36 @@ private:
         return p;
     }
 
+    static void join(DisjointSets& sets, std::size_t a, std::size_t b) {
+        const auto [low, high] = std::minmax({sets.find(static_cast<int>(a)), sets.find(static_cast<int>(b))});
+        sets.link(high, low);
+    }
+
+    // Joins runs that end in the last column with those of the same row, or one up to `reach` away, in the first.
+    template <class T>
+    void join_around(const T* image, int rows, int cols, int reach, const std::vector<Run>& found, DisjointSets& sets) {
+        constexpr std::size_t none = ~std::size_t{0};
+        std::vector<std::size_t> in_first(static_cast<std::size_t>(rows), none), in_last = in_first;
+        for (std::size_t i = 0; i < found.size(); ++i) {
+            const auto row = static_cast<std::size_t>(row_of(found[i].begin));
+            if (col_of(found[i].begin) == 0) in_first[row] = i;
+            if (col_of(found[i].end) == cols) in_last[row] = i;
+        }
+        for (int row = 0; row < rows; ++row) {
+            const std::size_t left = in_last[static_cast<std::size_t>(row)];
+            for (int other = std::max(row - reach, 0); left != none && other <= std::min(row + reach, rows - 1);
+                 ++other) {
+                const std::size_t right = in_first[static_cast<std::size_t>(other)];
+                if (right != none && image[found[left].begin] == image[found[right].begin]) join(sets, left, right);
+            }
+        }
+    }
+
     void sort(const std::vector<Run>& found, DisjointSets& sets) {
         std::vector<std::size_t> sizes, component(found.size());
+        Checkpoints checkpoints;
         for (std::size_t i = 0; i < found.size(); ++i) {
+            checkpoints.pass();
             const auto root = static_cast<std::size_t>(sets.find(static_cast<int>(i)));
             if (root == i) {
                 component[i] = areas_.size();

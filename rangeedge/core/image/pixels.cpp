@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/simd.hpp"
+#include "base/watch.hpp"
 
 namespace rangeedge {
 namespace {
@@ -74,6 +75,7 @@ void mark_boundary(const Frame<T>& frame, std::uint8_t bit, std::uint8_t* kind) 
         return flags.data() + static_cast<std::size_t>((row + 3) % 3) * width + 1;
     };
     for (int row = 0; row <= frame.rows; ++row) {
+        Watch::checkpoint();
         std::uint8_t *flags = row_of(invalid, row), *wider = row_of(wide, row);
         const std::int64_t first = static_cast<std::int64_t>(row) * cols;
         if (row == frame.rows)

@@ -107,18 +107,23 @@ Windows windows_of(const T* ordinate, int rows, int cols, int apart, bool counts
     const int every = 1 + static_cast<int>(static_cast<std::int64_t>(rows) * cols / most_windows);
     Windows windows;
     windows.counts_constant = counts_constant;
-    for (const int v : sampled(rows, every))
+    for (const int v : sampled(rows, every)) {
+        Watch::checkpoint();
         windows.add_line(ordinate + static_cast<std::ptrdiff_t>(v) * cols, cols, apart);
+    }
     // Columns are copied, several at a time, since the image lies row by row.
     const std::vector<int> columns = sampled(cols, every);
     std::vector<T> copies(columns.size() * static_cast<std::size_t>(rows));
     for (std::size_t v = 0; v < static_cast<std::size_t>(rows); ++v) {
+        Watch::checkpoint();
         const T* row = ordinate + v * static_cast<std::size_t>(cols);
         for (std::size_t i = 0; i < columns.size(); ++i)
             copies[i * static_cast<std::size_t>(rows) + v] = row[columns[i]];
     }
-    for (std::size_t i = 0; i < columns.size(); ++i)
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+        Watch::checkpoint();
         windows.add_line(copies.data() + i * static_cast<std::size_t>(rows), rows, apart);
+    }
     return windows;
 }
 

@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "python/unlock.hpp"
+
 namespace rangeedge::python {
 
 namespace nb = nanobind;
@@ -36,9 +38,6 @@ int cols(const A& image) {
 // An array argument, and one that may be None.
 inline auto array(const char* name) { return nb::arg(name).noconvert(); }
 inline auto optional_array(const char* name) { return nb::arg(name).noconvert().none(); }
-
-// Kernels run while other Python threads do.
-using Unlocked = nb::call_guard<nb::gil_scoped_release>;
 
 // Hands a vector to NumPy without a copy; elements that hold several T become rows.
 template <class T, class E>

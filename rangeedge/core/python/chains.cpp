@@ -38,7 +38,7 @@ std::pair<Points, Chains> bound_link_edges(const BoundFrame& bound, const BoundC
                                            const LinkOptions& options, int threads) {
     LinkedEdges linked;
     {
-        nb::gil_scoped_release release;
+        const Unlock unlock;
         linked = std::visit(
             [&](const auto& frame) {
                 return link_edges(frame, candidates.all, thin.data(), kinds.data(), options, threads);

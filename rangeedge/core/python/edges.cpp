@@ -6,6 +6,7 @@
 #include "edges/select.hpp"
 #include "edges/thin.hpp"
 #include "image/pixels.hpp"
+#include "python/candidates.hpp"
 #include "python/frame.hpp"
 #include "scanline/split.hpp"
 
@@ -16,7 +17,7 @@ template <class T>
 auto split_scan_line(const Values<T>& y, const Values<T>& x, double eps) {
     std::vector<Segment> segments;
     {
-        nb::gil_scoped_release release;
+        const Unlock unlock;
         std::vector<T> samples(y.data(), y.data() + y.size());
         samples.resize(y.size() + padding);
         Splitter<T> splitter;
@@ -31,32 +32,10 @@ std::vector<Candidate> candidates_of(const BoundFrame& bound, const ScanLineOpti
     return std::visit([&](const auto& frame) { return find_candidates(frame, options, threads); }, bound.frame);
 }
 
-using Columns = nb::typed<nb::dict, nb::str, nb::any>;
-
-// One array a field, by the field's name.
-Columns columns(const std::vector<Candidate>& candidates) {
-    nb::dict result;
-    const auto add = [&](const char* name, auto member) {
-        using E = std::decay_t<decltype(candidates[0].*member)>;
-        std::vector<E> values;
-        values.reserve(candidates.size());
-        for (const Candidate& c : candidates) values.push_back(c.*member);
-        result[name] = handed_over<E>(std::move(values));
-    };
-    add("x", &Candidate::x);
-    add("y", &Candidate::y);
-    add("jump", &Candidate::jump);
-    add("crease", &Candidate::crease);
-    add("kind", &Candidate::kind);
-    add("significance", &Candidate::significance);
-    add("direction", &Candidate::direction);
-    return result;
-}
-
 Columns edge_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads) {
     std::vector<Candidate> candidates;
     {
-        nb::gil_scoped_release release;
+        const Unlock unlock;
         candidates = candidates_of(frame, options, threads);
         put_in_order(candidates);
     }
@@ -81,7 +60,7 @@ Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOpti
                                      const Strengths& significance) {
     std::vector<Candidate> candidates;
     {
-        nb::gil_scoped_release release;
+        const Unlock unlock;
         candidates = candidates_of(frame, options, threads);
         fill(frame, candidates, jump, crease, kind, significance);
         put_in_order(candidates);
@@ -94,9 +73,9 @@ void flying_pixels(const BoundFrame& bound, const ScanLineOptions& options, int 
     std::visit([&](const auto& frame) { find_candidates(frame, options, threads, flying.data()); }, bound.frame);
 }
 
-void bound_keep_lines(const Image<std::uint8_t>& edges, int min_length, const Image<float>& significance,
+void bound_keep_lines(const Image<std::uint8_t>& edges, bool wrap, int min_length, const Image<float>& significance,
                       double least_significance, const OutImage<std::uint8_t>& kept) {
-    keep_lines(edges.data(), rows(edges), cols(edges), min_length, significance.data(), least_significance,
+    keep_lines(edges.data(), rows(edges), cols(edges), wrap, min_length, significance.data(), least_significance,
                kept.data());
 }
 
@@ -125,7 +104,7 @@ void bind_edges(nb::module_& m) {
     m.def("flying_pixels", &flying_pixels, "frame"_a, "options"_a, "threads"_a, array("flying"), Unlocked());
     m.def("thin_lines", &thin_to_lines, array("edges"), optional_array("preferred"), "spur_length"_a, array("thin"),
           Unlocked());
-    m.def("keep_lines", &bound_keep_lines, array("edges"), "min_length"_a, optional_array("significance"),
+    m.def("keep_lines", &bound_keep_lines, array("edges"), "wrap"_a, "min_length"_a, optional_array("significance"),
           "least_significance"_a, array("kept"), Unlocked());
 }
 

@@ -83,7 +83,9 @@ void Adjacency::collect() {
 void Adjacency::sort_by_section() {
     PairNumbers numbers;
     std::vector<int> start(1, 0);
+    Checkpoints checkpoints;
     for (Contact& c : contacts_) {
+        checkpoints.pass();
         const int a = patches_.surface(patches_[c.p]), b = patches_.surface(patches_[c.q]);
         c.section = numbers(std::min(a, b), std::max(a, b));
         start.resize(numbers.pairs().size() + 1, 0);
@@ -125,7 +127,9 @@ const std::vector<Adjacency::Neighbours>& Adjacency::update() {
     std::vector<int> unknown;
     PairNumbers numbers;
     std::vector<std::pair<int, int>> of_pair;  // sections by pair of patches
+    Checkpoints checkpoints;
     for (int k = 0; k < sections_.count(); ++k) {
+        checkpoints.pass();
         Section& s = sections_[k];
         s.known = s.known && !changed_[s.a] && !changed_[s.b];
         s.a = patches_.surface(s.a), s.b = patches_.surface(s.b);

@@ -44,6 +44,7 @@ private:
     template <class F>
     static void for_runs(const LabelImage& image, F&& visit) {
         for (int row = 0; row < image.rows; ++row) {
+            Watch::checkpoint();
             const std::int32_t* const labels =
                 image.labels + static_cast<std::size_t>(row) * static_cast<std::size_t>(image.cols);
             for (int col = 0; col < image.cols;) {
@@ -88,6 +89,7 @@ public:
     void for_pixels(int label, F&& visit) const {
         runs_.for_runs_of(label, [&](const LabelRuns::Run& run) {
             const std::size_t row = static_cast<std::size_t>(run.row) * static_cast<std::size_t>(image_.cols);
+            Watch::checkpoint();
             for (int col = run.begin; col < run.end; ++col) visit(row + static_cast<std::size_t>(col), run.row, col);
         });
     }

@@ -123,7 +123,9 @@ void Grower::over_tiles(const Tiles& tiles) {
         for (const auto& [level, entry] : of_thread) queue_.push(level, entry);
     taken_.clear();
     TileQueue::Entry entry{};
+    Checkpoints checkpoints(256);
     while (queue_.pop(entry)) {
+        checkpoints.pass();
         const auto [t, i] = entry;
         if (!is_free(tiles, t)) continue;
         if (level_of(tiles, t, i) == TileQueue::levels) continue;  // the surface has changed meanwhile
@@ -160,7 +162,9 @@ Grower::Choice Grower::choose(int p) const {
 template <class F>
 void Grower::for_front(F&& visit) {
     const auto visit_all = [&](int begin, int end, int) {
+        Checkpoints checkpoints;
         for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+            checkpoints.pass();
             patches_.prefetch(front_[std::min(k + prefetched, front_.size() - 1)]);
             visit(k);
         }
@@ -176,7 +180,9 @@ void Grower::for_front(F&& visit) {
 void Grower::commit(bool refit) {
     const int threads = front_.size() >= worth_threads ? patches_.team().size() : 1;
     const auto of_thread = [&](int thread) {
+        Checkpoints checkpoints;
         for (std::size_t k = 0; k < front_.size(); ++k) {
+            checkpoints.pass();
             const int p = front_[k], i = choices_[k].patch;
             patches_.prefetch(front_[std::min(k + prefetched, front_.size() - 1)]);
             if (i % threads != thread) continue;
@@ -205,12 +211,15 @@ int Grower::over_pixels(int rounds, bool refit) {
         commit(refit);
         next_.swap(front_);
         front_.clear();
-        for (std::size_t k = 0; k < next_.size(); ++k)
+        Checkpoints checkpoints;
+        for (std::size_t k = 0; k < next_.size(); ++k) {
+            checkpoints.pass();
             if (choices_[k].patch) {
                 ++count;
                 for (const int step : image_.neighbours())
                     if (patches_.is_free(next_[k] + step, reach_)) wait(next_[k] + step);
             }
+        }
     }
     return count;
 }
@@ -238,7 +247,9 @@ void Grower::adjust_borders() {
         next_.swap(front_);
         front_.clear();
         for (const int p : next_) waiting_[p] = 0;
+        Checkpoints checkpoints;
         for (std::size_t k = 0; k < next_.size(); ++k) {
+            checkpoints.pass();
             const int p = next_[k];
             if (choices_[k].patch == patches_[p]) continue;
             patches_.take(p, choices_[k].patch);

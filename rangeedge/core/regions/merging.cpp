@@ -55,7 +55,9 @@ void merge(PatchMap& patches, Adjacency& adjacency) {
     for (int round = 0; changed && round < most_rounds; ++round) {
         changed = false;
         Array<char> refitted(patches.count(), 0);
+        Checkpoints checkpoints(256);
         for (const auto& found : adjacency.update()) {
+            checkpoints.pass();
             int a = patches.surface(found.a), b = patches.surface(found.b);
             if (patches.patch(a).count() < patches.patch(b).count()) std::swap(a, b);
             const Patch& large = patches.patch(a);

@@ -81,7 +81,9 @@ void PatchMap::add_markers(const std::int32_t* markers) {
         }
     std::stable_sort(runs.begin(), runs.end(), [](const Run& a, const Run& b) { return a.marker < b.marker; });
     std::vector<Pixels> sets;
+    Checkpoints checkpoints;
     for (std::size_t k = 0; k < runs.size(); ++k) {
+        checkpoints.pass();
         if (k == 0 || runs[k].marker != runs[k - 1].marker) sets.emplace_back();
         for (int p = runs[k].begin; p < runs[k].end; ++p)
             if (image_.open(p)) sets.back().push_back(p);
@@ -102,9 +104,12 @@ bool PatchMap::add_patches(const std::vector<Pixels>& sets, const std::vector<Su
         divide(sets[k], sums[k], 0, pieces[k]);
     });
     const int before = count();
+    Checkpoints checkpoints(64);
     for (const auto& of_set : pieces)
-        for (const Piece& piece : of_set)
+        for (const Piece& piece : of_set) {
+            checkpoints.pass();
             if (image_.residual(piece.sums, piece.surface) < limit * limit) create(piece);
+        }
     return count() > before;
 }
 

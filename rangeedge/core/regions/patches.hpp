@@ -82,16 +82,20 @@ public:
 
     template <class F>
     void for_pixels(F&& visit) const {
-        for (int row = 0; row < image_.rows(); ++row)
+        for (int row = 0; row < image_.rows(); ++row) {
+            Watch::checkpoint();
             for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; ++p) visit(p);
+        }
     }
     // Pixels of rows [first, last) whose patch is not that of their right or lower neighbour, in raster order.
     template <class F>
     void for_borders(int first, int last, F&& visit) const {
         constexpr int block = 16;
         const int stride = image_.stride();
+        Checkpoints checkpoints(64);
         for (int row = first; row < last; ++row)
             for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; p += block) {
+                checkpoints.pass();
                 const int n = std::min(block, end - p);
                 const int* const label = &label_[p];
                 int differ = 0;

@@ -53,6 +53,7 @@ bool split_roof(const SurfaceImage& image, const Pixels& pixels, const Surface& 
     const std::size_t least = std::max<std::size_t>(static_cast<std::size_t>(least_pixels) / step, 4);
     double of_roof = 0, of_curved = 0;
     for (int round = 0; round < roof_rounds; ++round) {
+        Watch::checkpoint();
         if (side_a.size() < least || side_b.size() < least) return false;
         roof.first = plane_of(side_a), roof.second = plane_of(side_b);
         const double bend = std::hypot(roof.first.c[1] - roof.second.c[1], roof.first.c[2] - roof.second.c[2]);
@@ -73,7 +74,9 @@ bool split_roof(const SurfaceImage& image, const Pixels& pixels, const Surface& 
     const double gain = std::max(1 - roof_gain * roof_gain, chance);
     if (side_a.size() < least || side_b.size() < least || of_roof >= (1 - gain) * of_curved) return false;
     first.clear(), second.clear();
+    Checkpoints checkpoints;
     for (const int p : pixels) {
+        checkpoints.pass();
         const Sample s = image.sample(p);
         const bool on_a = roof.in_first(roof.first.value_on_plane(s.x, s.y), roof.second.value_on_plane(s.x, s.y));
         (on_a ? first : second).push_back(p);

@@ -51,11 +51,13 @@ struct Pass {
     bool same_sides(const Pass& other) const { return a == other.a && b == other.b; }
 };
 
-// A distance map in an image with a margin of one pixel; 0 is no pixel.
+// A distance map in an image with a margin of one pixel; 0 is no pixel. Where it wraps, the margin beside the first
+// column is a copy of the last column and the other way round, and `own` tells the pixel itself.
 class DistanceImage {
 public:
-    DistanceImage(const float* distance, const std::uint8_t* mask, int rows, int cols, float lowest, Team& team)
-        : rows_(rows), cols_(cols), team_(team), level_((rows + 2) * stride(), 0) {
+    DistanceImage(const float* distance, const std::uint8_t* mask, int rows, int cols, bool wrap, float lowest,
+                  Team& team)
+        : rows_(rows), cols_(cols), wrap_(wrap), team_(team), level_((rows + 2) * stride(), 0) {
         parallel_for(rows, team, [&](int first, int last, int) {
             for (int row = first; row < last; ++row)
                 for (int col = 0; col < cols; ++col) {
@@ -64,11 +66,17 @@ public:
                     level_[index(row, col)] = exists ? bits_of(distance[k]) : 0;
                 }
         });
+        copy_around(level_);
     }
 
     int stride() const { return cols_ + 2; }
     int index(int row, int col) const { return (row + 1) * stride() + col + 1; }
     int size() const { return level_.count(); }
+    int own(int p) const {
+        if (!wrap_) return p;
+        const int col = p % stride();
+        return col == 0 ? p + cols_ : col > cols_ ? p - cols_ : p;
+    }
     float operator[](int p) const { return value_of(level_[p]); }
     bool reaches(int p, std::int32_t least) const { return level_[p] >= least; }
     std::array<int, 8> neighbours() const {
@@ -82,14 +90,31 @@ public:
     std::vector<Pass> passes(const Array<int>& summit) const;
     template <class F>
     void for_pixels(int first, int last, F&& visit) const {
-        for (int row = first; row < last; ++row)
+        for (int row = first; row < last; ++row) {
+            Watch::checkpoint();
             for (int p = index(row, 0), end = p + cols_; p < end; ++p)
                 if (level_[p] > 0) visit(p);
+        }
     }
     int rows() const { return rows_; }
 
 private:
+    void copy_around(Array<std::int32_t>& values) const {
+        for (int row = 0; wrap_ && row < rows_; ++row) {
+            const int first = index(row, 0), last = index(row, cols_ - 1);
+            values[first - 1] = values[last], values[last + 1] = values[first];
+        }
+    }
+    // The highest of a pixel and its neighbours.
+    int highest_around(int p) const {
+        int top = p;
+        for (const int step : neighbours())
+            if (const int q = own(p + step); higher(q, top)) top = q;
+        return top;
+    }
+
     int rows_, cols_;
+    bool wrap_;
     Team& team_;
     Array<std::int32_t> level_;  // bits of distances
 };
@@ -111,6 +136,8 @@ Array<int> DistanceImage::basins() const {
             keep_highest(own, 0, cols_, top.data(), to);
             for (std::size_t k = 4; k < 8; ++k) keep_highest(own + around[k], around[k], cols_, top.data(), to);
             for (int k = 0; k < cols_; ++k) to[k] += begin + k;
+            if (!wrap_) continue;
+            for (const int k : {0, cols_ - 1}) to[k] = highest_around(begin + k);  // of copies the index is another
         }
     });
     // Ways are shortened while they are followed.
@@ -119,6 +146,7 @@ Array<int> DistanceImage::basins() const {
         while (uphill[q] != q) q = uphill[q] = uphill[uphill[q]];
         uphill[p] = q;
     });
+    copy_around(uphill);
     return uphill;
 }
 
@@ -145,7 +173,9 @@ std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
     });
     std::vector<Pass> all;
     for (const auto& passes : found) all.insert(all.end(), passes.begin(), passes.end());
-    std::sort(all.begin(), all.end(), [](const Pass& m, const Pass& n) {
+    Checkpoints checkpoints;
+    std::sort(all.begin(), all.end(), [&](const Pass& m, const Pass& n) {
+        checkpoints.pass();
         return m.level != n.level ? m.level > n.level : std::make_pair(m.a, m.b) < std::make_pair(n.a, n.b);
     });
     return all;
@@ -164,7 +194,9 @@ std::vector<int> peaks(const DistanceImage& image, const Array<int>& summit, flo
     };
     const auto at = [&](int i) { return summits[static_cast<std::size_t>(i)]; };
     std::vector<int> found;
+    Checkpoints checkpoints;
     for (const Pass& pass : image.passes(summit)) {
+        checkpoints.pass();
         int low = islands.find(number(pass.a)), high = islands.find(number(pass.b));
         if (low == high) continue;
         if (image.higher(at(low), at(high))) std::swap(low, high);
@@ -178,14 +210,15 @@ std::vector<int> peaks(const DistanceImage& image, const Array<int>& summit, flo
 
 }  // namespace
 
-int extract_seeds(const float* distance, const std::uint8_t* mask, int height, int width, float min_distance,
+int extract_seeds(const float* distance, const std::uint8_t* mask, int height, int width, bool wrap, float min_distance,
                   float separation, int threads, std::int32_t* markers) {
     Team team(threads);
-    const DistanceImage image(distance, mask, height, width, separation * min_distance, team);
+    const DistanceImage image(distance, mask, height, width, wrap, separation * min_distance, team);
     // Flood every seed from its peak.
     Array<int> seed(image.size(), 0);
     std::vector<int> stack;
     int seeds = 0;
+    Checkpoints checkpoints;
     for (const int peak : peaks(image, image.basins(), separation)) {
         if (image[peak] < min_distance) continue;
         // Where all is infinitely far, or `separation` vanishes in single precision, nothing but no pixel is too low.
@@ -194,12 +227,14 @@ int extract_seeds(const float* distance, const std::uint8_t* mask, int height, i
         seed[peak] = ++seeds;
         stack.assign(1, peak);
         while (!stack.empty()) {
+            checkpoints.pass();
             const int p = stack.back();
             stack.pop_back();
             for (const int step : image.neighbours()) {
-                if (!image.reaches(p + step, least) || seed[p + step]) continue;
-                seed[p + step] = seeds;
-                stack.push_back(p + step);
+                const int q = image.own(p + step);
+                if (!image.reaches(q, least) || seed[q]) continue;
+                seed[q] = seeds;
+                stack.push_back(q);
             }
         }
     }

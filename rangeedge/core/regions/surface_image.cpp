@@ -24,12 +24,11 @@ SurfaceImage::SurfaceImage(const RangeMap& map, double lateral, Team& team)
       to_plane_(map.to_plane), pixel_(new Pixel[static_cast<std::size_t>(size())]), state_(size(), none) {
     Array<Range> ranges(team.size());
     parallel_for(rows_ * cols_, team, [&](int begin, int end, int thread) {
-        Range range;
+        Range& range = ranges[thread];
         for (int k = begin; k < end; ++k) {
             const float f = std::isfinite(map.ordinate[k]) ? map.ordinate[k] : 0.0f;
             range.low = std::min(range.low, f), range.high = std::max(range.high, f);
         }
-        ranges[thread] = range;
     });
     Range all;
     for (const Range& r : ranges) all = {std::min(all.low, r.low), std::max(all.high, r.high)};
@@ -70,7 +69,9 @@ double SurfaceImage::residual(const SurfaceSums& sums, const Surface& s) const {
 
 SurfaceSums SurfaceImage::origin_of(const Pixels& pixels) const {
     double x = 0, y = 0, f = 0;
+    Checkpoints checkpoints;
     for (const int p : pixels) {
+        checkpoints.pass();
         const Sample s = sample(p);
         x += s.x, y += s.y, f += s.ordinate;
     }
@@ -80,7 +81,11 @@ SurfaceSums SurfaceImage::origin_of(const Pixels& pixels) const {
 
 SurfaceSums SurfaceImage::sums_of(const Pixels& pixels) const {
     SurfaceSums sums = origin_of(pixels);
-    for (const int p : pixels) sums.add(sample(p));
+    Checkpoints checkpoints;
+    for (const int p : pixels) {
+        checkpoints.pass();
+        sums.add(sample(p));
+    }
     return sums;
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/watch.hpp"
 #include "scanline/fit.hpp"
 
 namespace rangeedge {
@@ -20,6 +21,7 @@ void Merger<T, List>::merge() {
     cuts_.resize(end_);
     for (int i = 0; i < end_; ++i) cuts_[i] = i;
     while (!cuts_.empty()) {
+        Watch::checkpoint();
         choose();
         for (const int i : chosen_) {
             const int right = next(i);
@@ -66,6 +68,7 @@ void Merger<T, List>::remove_bridges(Array<Curve>& curves) {
     changed.clear(), bridges.clear();
     for (int i = next(end_); i != end_; i = next(i)) changed.push_back(i);
     while (!changed.empty()) {
+        Watch::checkpoint();
         for (const int i : changed) {
             cost(i) = sides_without(i, curves).cost;
             if (cost(i) < HUGE_VAL && !chosen(i)) bridges.push_back(i);

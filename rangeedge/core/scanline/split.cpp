@@ -5,6 +5,7 @@
 #include <type_traits>
 
 #include "base/simd.hpp"
+#include "base/watch.hpp"
 
 namespace rangeedge {
 namespace {
@@ -219,6 +220,7 @@ void Splitter<T>::find_worst() {
 template <class T>
 void Splitter<T>::split() {
     for (; !pending_.empty(); pending_.swap(following_)) {
+        Watch::checkpoint();
         find_worst();
         int count = static_cast<int>(nodes_.size());
         std::ptrdiff_t follow = 0;

@@ -3,33 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 
-from ._check import deliver, described, fail, integer, public
-from .chains import EdgeChain, EdgeChains
-from .draw import KINDS, backdrop
-from .segments import SEGMENT, VERTEX
+from .._check import deliver, described, fail, integer
+from .._option import takes
+from ..chains import EdgeChain, EdgeChains
+from ..options import GEOMETRY
+from ..segments import SEGMENT, VERTEX
+from .palette import kind_colour
+from .relief import backdrop
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .._typed import GeometryOptions
 
 _SHIFT = 4  # binary digits of fractions of a pixel
 _VERTEX = (255, 255, 255)
 _INK, _HALO = (255, 255, 255), (0, 0, 0)
 
 
-@public
+@takes(GEOMETRY)
 def drawChains(
     src: np.ndarray,
     chains: EdgeChains | Sequence[EdgeChain],
     dst: np.ndarray | None = None,
     *,
     scale: int = 1,
-    K: np.ndarray | None = None,
-    heightMap: bool = False,
+    **geometry: Unpack[GeometryOptions],
 ) -> np.ndarray:
     """Draw chains as smooth lines over the shaded relief of a range image, or over a picture.
 
-    drawChains(src, chains[, dst], *[, scale[, K[, heightMap]]]) -> dst
+    drawChains(src, chains[, dst], *[, scale[, K[, ...]]]) -> dst
 
     Jumps are vermilion, convex edges yellow, concave ones blue. Open chains have a dot at either end.
 
@@ -42,8 +50,7 @@ def drawChains(
         Receives the result where shape and type fit.
     scale : int
         Pixels of the picture to one of the image, from 1 to 16.
-    K, heightMap
-        Geometry of a range image, as for :func:`drawEdges`.
+    {options}
 
     Returns
     -------
@@ -64,18 +71,18 @@ def drawChains(
     """
     if not isinstance(chains, Sequence) or not all(isinstance(chain, EdgeChain) for chain in chains):
         raise fail("chains", "EdgeChains, or a sequence of EdgeChain", described(chains))
-    canvas, scale = _canvas(src, scale, K, heightMap)
+    canvas, scale = canvas_of(src, scale, geometry)
     for chain in chains:
         places = np.column_stack([chain.points["x"], chain.points["y"]])
         places = places[np.isfinite(places).all(axis=1)]
         _line(canvas, places, chain.kind, scale, closed=chain.closed)
         if not chain.closed:
             for end in places[[0, -1]]:
-                _dot(canvas, end, _colour(chain.kind), scale)
+                _dot(canvas, end, kind_colour(chain.kind), scale)
     return deliver("dst", canvas, dst)
 
 
-@public
+@takes(GEOMETRY)
 def drawSegments(
     src: np.ndarray,
     segments: np.ndarray,
@@ -84,19 +91,19 @@ def drawSegments(
     *,
     scale: int = 1,
     lengths: bool = False,
-    K: np.ndarray | None = None,
-    heightMap: bool = False,
+    **geometry: Unpack[GeometryOptions],
 ) -> np.ndarray:
     """Draw segments and the vertices in which they meet over the relief of a range image, or over a picture.
 
-    drawSegments(src, segments[, vertices[, dst]], *[, scale[, lengths[, K[, heightMap]]]]) -> dst
+    drawSegments(src, segments[, vertices[, dst]], *[, scale[, lengths[, K[, ...]]]]) -> dst
 
     Colours are those of `drawChains`; vertices are white dots.
 
     Parameters
     ----------
-    src, dst, scale, K, heightMap
+    src, dst, scale
         As in `drawChains`.
+    {options}
     segments, vertices : structured ndarray
         From `fitSegments`.
     lengths : bool
@@ -123,7 +130,7 @@ def drawSegments(
     for name, value, dtype in (("segments", segments, SEGMENT), ("vertices", vertices, VERTEX)):
         if value is not None and (not isinstance(value, np.ndarray) or value.dtype != dtype):
             raise fail(name, "a structured array from fitSegments", described(value))
-    canvas, scale = _canvas(src, scale, K, heightMap)
+    canvas, scale = canvas_of(src, scale, geometry)
     for segment in segments:
         _line(canvas, segment["pixels"], int(segment["kind"]), scale)
     for vertex in vertices if vertices is not None else ():
@@ -133,35 +140,31 @@ def drawSegments(
     return deliver("dst", canvas, dst)
 
 
-def _canvas(src: np.ndarray, scale: int, K: np.ndarray | None, heightMap: bool) -> tuple[np.ndarray, int]:
+def canvas_of(src: np.ndarray, scale: int, geometry: GeometryOptions) -> tuple[np.ndarray, int]:
     scale = integer("scale", scale, 1, 16)
-    canvas = backdrop(src, K, heightMap)
+    canvas = backdrop(src, geometry)
     if scale > 1:
         canvas = cv2.resize(canvas, None, fx=scale, fy=scale, interpolation=cv2.INTER_CUBIC)
     return canvas, scale
 
 
-def _colour(kind: int) -> tuple[int, int, int]:
-    return next((colour for bit, colour, _ in reversed(KINDS) if kind & bit), _VERTEX)
-
-
-def _fixed(places: np.ndarray, scale: int) -> np.ndarray:
+def fixed(places: np.ndarray, scale: int) -> np.ndarray:
     """Places as integers of OpenCV, pixel centres being whole numbers in the image as in the picture."""
     return np.rint(((places + 0.5) * scale - 0.5) * (1 << _SHIFT)).astype(np.int32)
 
 
 def _line(canvas: np.ndarray, places: np.ndarray, kind: int, scale: int, *, closed: bool = False) -> None:
     width = max(1, (scale + 1) // 2)
-    cv2.polylines(canvas, [_fixed(places, scale)], closed, _colour(kind), width, cv2.LINE_AA, _SHIFT)
+    cv2.polylines(canvas, [fixed(places, scale)], closed, kind_colour(kind), width, cv2.LINE_AA, _SHIFT)
 
 
 def _dot(canvas: np.ndarray, place: np.ndarray, colour: tuple[int, int, int], scale: int) -> None:
-    x, y = _fixed(place, scale).tolist()
+    x, y = fixed(place, scale).tolist()
     cv2.circle(canvas, (x, y), (scale + 1) << _SHIFT, colour, cv2.FILLED, cv2.LINE_AA, _SHIFT)
 
 
 def _label(canvas: np.ndarray, place: np.ndarray, text: str, scale: int) -> None:
-    x, y = (_fixed(place, scale) >> _SHIFT).tolist()
+    x, y = (fixed(place, scale) >> _SHIFT).tolist()
     size = 0.3 + 0.06 * scale
     for colour, width in ((_HALO, 3), (_INK, 1)):
         cv2.putText(canvas, text, (x + 4, y - 4), cv2.FONT_HERSHEY_SIMPLEX, size, colour, width, cv2.LINE_AA)

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "cleaning/surfaces.hpp"
+
+#include <algorithm>
+
+namespace rangeedge {
+namespace {
+
+constexpr double curved_gain = 0.8;  // a quadratic must lower the rms of a plane to this share
+constexpr int least_curved = 40;     // pixels; fewer tell no curvature
+
+}  // namespace
+
+std::vector<Surface> fit_surfaces(const OrdinateMap& map, const std::int32_t* labels, int count) {
+    std::vector<SurfaceSums> sums(static_cast<std::size_t>(count));
+    for (int p = 0; p < map.size(); ++p) {
+        if (labels[p] <= 0 || !map.valid(p)) continue;
+        SurfaceSums& own = sums[static_cast<std::size_t>(labels[p])];
+        const double x = map.x_of(p), y = map.y_of(p), ordinate = static_cast<double>(map.ordinate[p]);
+        if (own.count() == 0) own = SurfaceSums(x, y, ordinate);
+        own.add({x, y, ordinate, 1});
+    }
+    std::vector<Surface> surfaces(sums.size());
+    for (std::size_t label = 1; label < sums.size(); ++label) {
+        const SurfaceSums& own = sums[label];
+        if (own.count() == 0) continue;
+        // Counted from the middle, where powers are smallest.
+        SurfaceSums middle(own.mean_x(), own.mean_y(), own.mean_ordinate());
+        middle.add(own);
+        surfaces[label] = middle.plane();
+        if (middle.count() < least_curved) continue;
+        const Surface quadratic = middle.quadratic();
+        if (quadratic.rms < curved_gain * surfaces[label].rms) surfaces[label] = quadratic;
+    }
+    return surfaces;
+}
+
+}  // namespace rangeedge

@@ -1,0 +1,119 @@
+"""Regions in colours of their own, after Tol: for the usual forms of colour blindness."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .. import _check
+from .._option import takes
+from ..options import GEOMETRY
+from .relief import backdrop, nearest
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from .._typed import GeometryOptions
+
+REGION_COLOURS = np.array(  # Tol's muted scheme
+    [
+        (238, 204, 136), (119, 102, 204), (119, 204, 221), (51, 119, 17), (136, 34, 51),
+        (153, 68, 170), (153, 170, 68), (51, 153, 153), (85, 34, 136),
+    ],
+    np.uint8,
+)  # fmt: skip
+
+
+@takes(GEOMETRY)
+def drawRegions(
+    labels: np.ndarray,
+    src: np.ndarray | None = None,
+    alpha: float = 0.6,
+    dst: np.ndarray | None = None,
+    **geometry: Unpack[GeometryOptions],
+) -> np.ndarray:
+    """Draw every region in a colour of its own among its neighbours.
+
+    drawRegions(labels[, src[, alpha[, dst]]], *[, K[, ...]]) -> dst
+
+    Nine colours are shared out so that regions next to each other, or across a gap without label, differ.
+
+    Parameters
+    ----------
+    labels : ndarray of shape (H, W), CV_32S
+        Region of every pixel; 0 and negative values are none.
+    src : ndarray, optional
+        Range image, points, or CV_8UC3 picture to draw on; black without it.
+    alpha : float
+        Opacity of the regions over `src`, in [0, 1]. Without `src` they are opaque.
+    dst : ndarray of shape (H, W, 3), CV_8U, optional
+        Receives the result where shape and type fit.
+    {options}
+
+    Returns
+    -------
+    dst : ndarray of shape (H, W, 3), CV_8U
+
+    Raises
+    ------
+    rangeedge.error
+        If an image has a wrong type or shape, shapes differ, or `alpha` is out of range.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rangeedge import drawRegions
+    >>> drawRegions(np.int32([[0, 1, 2, 1]]))[0]
+    array([[  0,   0,   0],
+           [238, 204, 136],
+           [119, 102, 204],
+           [238, 204, 136]], dtype=uint8)
+    """
+    labels = _check.labels32s("labels", labels)
+    alpha = _check.number("alpha", alpha, 0, 1)
+    if src is None:
+        canvas, alpha = np.zeros((*labels.shape, 3), np.uint8), 1.0
+    else:
+        canvas = backdrop(src, geometry, labels.shape)
+    inside = labels > 0
+    if inside.any():
+        colours = _region_colours(labels, inside)
+        canvas[inside] = np.rint(alpha * colours + (1 - alpha) * canvas[inside])
+    return _check.deliver("dst", canvas, dst)
+
+
+def _region_colours(labels: np.ndarray, inside: np.ndarray) -> np.ndarray:
+    """Colour of every pixel inside a region."""
+    names, region = np.unique(labels[inside], return_inverse=True)
+    region = region.reshape(-1)
+    choice = shared_out(names, _neighbours(region[nearest(inside)]))
+    return REGION_COLOURS[choice[region]]
+
+
+def _neighbours(region: np.ndarray) -> dict[int, set[int]]:
+    """Which regions touch, 8-connected, in a map that regions fill."""
+    neighbours = defaultdict(set)
+    for a, b in (
+        (region[:, 1:], region[:, :-1]),
+        (region[1:], region[:-1]),
+        (region[1:, 1:], region[:-1, :-1]),
+        (region[1:, :-1], region[:-1, 1:]),
+    ):
+        differ = a != b
+        pairs = np.unique(a[differ] * (region.max() + 1) + b[differ])
+        for i, j in zip(*(part.tolist() for part in np.divmod(pairs, region.max() + 1)), strict=True):
+            neighbours[i].add(j)
+            neighbours[j].add(i)
+    return neighbours
+
+
+def shared_out(names: np.ndarray, neighbours: dict[int, set[int]]) -> np.ndarray:
+    """Colour number of each region: its own by label, or else the next that no coloured neighbour has."""
+    choice = np.empty(len(names), np.intp)
+    for i, name in enumerate(names.tolist()):
+        taken = {choice[j] for j in neighbours[i] if j < i}
+        own = [(name - 1 + k) % len(REGION_COLOURS) for k in range(len(REGION_COLOURS))]
+        choice[i] = next((c for c in own if c not in taken), own[0])
+    return choice

@@ -1,0 +1,84 @@
+"""A frame that is read when it is needed, by whom it is needed: small, and so sent to other processes."""
+
+from __future__ import annotations
+
+import functools
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Any, TypeVar
+
+from .._check import error
+from ..io import RangeImage
+
+_R = TypeVar("_R")
+
+
+@dataclass(frozen=True)
+class FrameSource:
+    """Where a frame is, and how it is read.
+
+    Attributes
+    ----------
+    name : str
+        Of its results: a path of the frame in its recording, without suffix.
+    path : str
+        The file or folder that holds it.
+    part : str
+        Which frame of that, as a person would say it; empty where there is only one.
+    """
+
+    name: str
+    path: str
+    part: str
+    load: Callable[[], RangeImage] = field(repr=False)
+    geometry: Mapping[str, Any] = field(default_factory=dict, repr=False)
+
+    @property
+    def title(self) -> str:
+        """File and part."""
+        return f"{self.path}: {self.part}" if self.part else self.path
+
+    def read(self, **given: Any) -> RangeImage:
+        """The range image, with the camera of the recording and a geometry that replaces it."""
+        image = self.load()
+        image = image._replace(geometry={**image.geometry, **self.geometry})
+        return image.withGeometry(**given)
+
+
+@dataclass(frozen=True)
+class Unreadable:
+    """Reads nothing, and says why."""
+
+    reason: str
+
+    def __call__(self) -> RangeImage:
+        raise error(self.reason)
+
+
+def extra(module: str, name: str, purpose: str) -> ModuleType:
+    """A module of an extra; where it is missing the error says what to install."""
+    from importlib import import_module
+
+    try:
+        return import_module(module)
+    except ImportError as reason:
+        raise error(f"{purpose} needs {module.partition('.')[0]}: pip install 'rangeedge[{name}]'") from reason
+
+
+def kept(files: int) -> Callable[[Callable[[str], _R]], Callable[[str], _R]]:
+    """Keep what a function makes of the last few files, for as long as these stay as they are."""
+
+    def keeping(function: Callable[[str], _R]) -> Callable[[str], _R]:
+        @functools.lru_cache(maxsize=files)
+        def of_state(path: str, modified: int) -> _R:
+            return function(path)
+
+        @functools.wraps(function)
+        def call(path: str) -> _R:
+            return of_state(path, os.stat(path).st_mtime_ns)
+
+        return call
+
+    return keeping

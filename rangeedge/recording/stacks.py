@@ -1,0 +1,129 @@
+"""Many frames in one file: NPY, NPZ and Zarr of shape (N, H, W) or (N, H, W, 3), and TIFF files of many pages."""
+
+from __future__ import annotations
+
+import functools
+import math
+import mmap
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._check import error
+from ..io import RangeImage
+from ..io.arrays import read_archive, source_name
+from ..io.files import as_range_image
+from ..io.source import opened
+from ..io.tiff import images_of_tiff, read_page
+from ..io.tiff_tags import Page
+from .source import FrameSource, extra, kept
+
+_TIFF_HEADS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
+_PAGES = 2**20
+_NPZ_BYTES = 2**34  # of an array that is unpacked as a whole
+_GEOMETRY = ("K", "pixelSize", "heightMap", "depthFactor")
+
+
+def stack_frames(path: str) -> list[FrameSource]:
+    """The frames of a file that holds several; none where it is a range image of its own."""
+    geometry: Mapping[str, Any] = {}
+    load: Callable[[str, int], RangeImage]
+    if is_zarr(path):
+        array, geometry = zarr_array(path)
+        count, load = _frames(array.shape, array.dtype), _zarr_frame
+    else:
+        with opened(path, math.inf) as (stream, _):
+            head = stream.read(6)
+            if head == b"\x93NUMPY":
+                array = npy_array(path)
+                count, load = _frames(array.shape, array.dtype), _npy_frame
+            elif head[:4] == b"PK\x03\x04":
+                array, geometry = _npz(path)
+                count, load = _frames(array.shape, array.dtype), _npz_frame
+            elif head[:4] in _TIFF_HEADS:
+                pages = len(_pages(path))
+                count, load = pages if pages > 1 else 0, _tiff_frame
+            else:
+                return []
+    digits = max(4, len(str(count - 1)))
+    return [
+        FrameSource(
+            f"{Path(path).stem}/{index:0{digits}d}",
+            path,
+            f"frame {index}",
+            functools.partial(_checked, load, path, index),
+            geometry,
+        )
+        for index in range(count)
+    ]
+
+
+def _frames(shape: tuple[int, ...], dtype: np.dtype) -> int:
+    """How many frames an array of this shape holds; 0 where it is one range image."""
+    if len(shape) == 4 or (len(shape) == 3 and not (dtype.kind == "f" and shape[2] in (1, 3, 4))):
+        return shape[0]
+    return 0
+
+
+def _checked(load: Callable[[str, int], RangeImage], path: str, index: int) -> RangeImage:
+    image = load(path, index)
+    try:
+        return image._replace(src=as_range_image(image.src))
+    except ValueError as reason:
+        raise error(f"cannot read {path!r}, frame {index}: {reason}") from None
+
+
+@kept(4)
+def npy_array(path: str) -> np.ndarray:
+    """The array of a file, read where it is looked at."""
+    return np.load(path, mmap_mode="r", allow_pickle=False)
+
+
+def _npy_frame(path: str, index: int) -> RangeImage:
+    return RangeImage(np.array(npy_array(path)[index]))
+
+
+@kept(1)  # it may fill much of the memory
+def _npz(path: str) -> RangeImage:
+    with opened(path, math.inf) as (stream, size):
+        return read_archive(stream, size, _NPZ_BYTES)
+
+
+def _npz_frame(path: str, index: int) -> RangeImage:
+    return RangeImage(_npz(path).src[index])
+
+
+@kept(4)
+def _pages(path: str) -> list[Page]:
+    with open(path, "rb") as stream:
+        return images_of_tiff(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ), _PAGES)  # type: ignore[arg-type]
+
+
+def _tiff_frame(path: str, index: int) -> RangeImage:
+    with opened(path, math.inf):
+        return read_page(_pages(path)[index])
+
+
+def is_zarr(path: str) -> bool:
+    """Whether a folder is a Zarr store, of either version."""
+    return any((Path(path) / name).exists() for name in ("zarr.json", ".zarray", ".zgroup"))
+
+
+@kept(4)
+def zarr_array(path: str) -> tuple[Any, Mapping[str, Any]]:
+    """The array of a store, or that of a group which is named as in NPZ files; attributes may hold the geometry."""
+    found = extra("zarr", "zarr", f"{path!r}").open(path, mode="r")
+    attributes = dict(found.attrs)
+    if hasattr(found, "array_keys"):
+        try:
+            found = found[source_name(sorted(found.array_keys()))]
+        except ValueError as reason:
+            raise error(f"cannot read {path!r}: {reason}") from None
+        attributes |= dict(found.attrs)
+    return found, {key: attributes[key] for key in _GEOMETRY if key in attributes}
+
+
+def _zarr_frame(path: str, index: int) -> RangeImage:
+    return RangeImage(np.asarray(zarr_array(path)[0][index]))

@@ -1,0 +1,214 @@
+"""Calls that are given up: by Ctrl-C, from another thread, and when Python ends."""
+
+import _thread
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import CancelledError
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rangeedge
+
+SOON = 0.2  # seconds
+TRIES = 3  # of which the quickest counts, as other programs may run
+SIDE = 1500  # pixels
+ROOT = Path(rangeedge.__file__).parents[1]
+
+
+def noise(side=SIDE):
+    return np.random.default_rng(0).normal(1, 0.1, (side, side)).astype(np.float32)
+
+
+def ramp(side=3000):
+    """Saliences whose multiplicative transform is slow: weights that fall as the distance grows."""
+    return np.tile(
+        np.maximum(1 - np.arange(side) / side, 0).astype(np.float32) * (np.arange(side) < side / 4), (side, 1)
+    )
+
+
+def comb(side=3000):
+    """An edge in the corner of a maze of walls."""
+    walls = np.zeros((side, side), np.uint8)
+    walls[5::6] = 255
+    walls[5::12, :2] = walls[11::12, -2:] = 0
+    edges = np.zeros_like(walls)
+    edges[0, 0] = 255
+    return edges, walls
+
+
+def calls():
+    z = noise()
+    edges, walls = comb()
+    full = np.full((2500, 2500), 255, np.uint8)
+    labels = np.arange(SIDE * SIDE, dtype=np.int32).reshape(SIDE, SIDE) // 3
+    markers = np.zeros(z.shape, np.int32)
+    markers[::4, ::4] = np.arange(1, markers[::4, ::4].size + 1).reshape(markers[::4, ::4].shape)
+    alternating = (-1.0) ** np.arange(40000) * np.arange(40000)
+    return {
+        "edgeStrength": lambda: rangeedge.edgeStrength(z, noise=1e-4),
+        "edgePoints": lambda: rangeedge.edgePoints(z, noise=1e-4),
+        "detectEdges": lambda: rangeedge.detectEdges(z, noise=1e-4),
+        "flyingPixels": lambda: rangeedge.flyingPixels(z, K=(SIDE, SIDE, SIDE / 2, SIDE / 2), noise=1e-4),
+        "linkEdges": lambda: rangeedge.linkEdges(z, noise=1e-4),
+        "segmentRegions": lambda: rangeedge.segmentRegions(z, noise=1e-4),
+        "segmentRegionsWithStats": lambda: rangeedge.segmentRegionsWithStats(z, noise=1e-4),
+        "growRegions": lambda: rangeedge.growRegions(np.tile(z, (2, 2)), np.tile(markers, (2, 2)), noise=1e-4),
+        "regionAdjacency": lambda: rangeedge.regionAdjacency(z, labels),
+        "closeContours": lambda: rangeedge.closeContours((z > 1.1).astype(np.uint8), z),
+        "thinEdges": lambda: rangeedge.thinEdges(full),
+        "distanceTransform": lambda: rangeedge.distanceTransform(edges, barrier=walls),
+        "salienceDistanceTransform": lambda: rangeedge.salienceDistanceTransform(ramp()),
+        "splitScanLine": lambda: rangeedge.splitScanLine(alternating, 0.1),
+    }
+
+
+def interrupted(call, after):
+    """Seconds from Ctrl-C to the end of a call; None where that was done before."""
+    rung = []
+
+    def ring():
+        rung.append(time.monotonic())
+        _thread.interrupt_main()
+
+    timer = threading.Timer(after, ring)
+    timer.start()
+    try:
+        call()
+        timer.cancel()
+        timer.join()
+        time.sleep(0.01)  # let a late one come
+    except KeyboardInterrupt:
+        return time.monotonic() - rung[0]
+    return None
+
+
+@pytest.mark.parametrize("name", list(calls()))
+def test_ctrl_c_ends_a_call_soon(name):
+    call = calls()[name]
+    for after in (0.05, 0.5):
+        waits = []
+        while len(waits) < TRIES and (not waits or min(waits) > SOON):
+            wait = interrupted(call, after)
+            if wait is None:
+                break
+            waits.append(wait)
+        assert not waits or min(waits) < SOON, f"{waits} s after {after} s"
+        assert waits or after > 0.05, "done too early for this test"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there are no such signals")
+def test_ctrl_c_in_a_terminal_ends_the_program():
+    program = f"""
+import sys; sys.path.insert(0, {str(ROOT)!r})
+import numpy as np, rangeedge
+z = np.random.default_rng(0).normal(1, .1, (2500, 2500))
+print("go", flush=True)
+rangeedge.detectEdges(z, noise=1e-4)
+"""
+    with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
+        assert run.stdout.readline() == b"go\n"
+        time.sleep(0.3)
+        run.send_signal(signal.SIGINT)
+        began = time.monotonic()
+        assert b"KeyboardInterrupt" in run.communicate()[1]
+        assert time.monotonic() - began < 5 * SOON  # the end of Python takes a while, too
+
+
+def test_another_signal_that_raises_ends_a_call():
+    if not hasattr(signal, "setitimer"):
+        pytest.skip("no timer signals")
+
+    def raise_timeout(*_):
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, raise_timeout)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.1)
+        with pytest.raises(TimeoutError):
+            rangeedge.detectEdges(noise(), noise=1e-4)
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)
+
+
+def test_a_call_is_given_up_from_another_thread():
+    z = noise()
+    waits = []
+    for _ in range(TRIES):
+        cancellation, said = rangeedge.Cancellation(), []
+
+        def cancel(cancellation=cancellation, said=said):
+            said.append(time.monotonic())
+            cancellation.cancel()
+
+        threading.Timer(0.1, cancel).start()
+        with cancellation, pytest.raises(CancelledError, match="given up"):
+            rangeedge.segmentRegions(z, noise=1e-4)
+        waits.append(time.monotonic() - said[0])
+        assert cancellation.cancelled
+    assert min(waits) < SOON
+
+
+def test_only_the_thread_that_has_entered_is_concerned():
+    z, cancellation, results = noise(300), rangeedge.Cancellation(), []
+    expected = rangeedge.detectEdges(z)
+    cancellation.cancel()
+
+    def detect():
+        results.append(rangeedge.detectEdges(z))
+
+    with cancellation:
+        with pytest.raises(CancelledError):
+            rangeedge.detectEdges(z)
+        thread = threading.Thread(target=detect)
+        thread.start()
+        thread.join()
+    assert np.array_equal(results[0], expected)
+    assert np.array_equal(rangeedge.detectEdges(z), expected)  # the block is left
+
+
+def test_blocks_may_be_nested():
+    z, outer, inner = noise(300), rangeedge.Cancellation(), rangeedge.Cancellation()
+    with outer:
+        with inner:
+            outer.cancel()
+            with pytest.raises(CancelledError):
+                rangeedge.detectEdges(z)
+        assert not inner.cancelled
+    with inner, inner:
+        rangeedge.detectEdges(z)
+    with inner:
+        pass
+    inner.cancel()
+    rangeedge.detectEdges(z)
+
+
+def test_what_was_given_up_leaves_dst_alone_and_the_next_call_right():
+    z = noise(400)
+    expected, dst = rangeedge.distanceTransform(z > 1.2), np.full(z.shape, -1, np.float32)
+    cancellation = rangeedge.Cancellation()
+    cancellation.cancel()
+    with cancellation, pytest.raises(CancelledError):
+        rangeedge.distanceTransform(z > 1.2, dst=dst)
+    assert (dst == -1).all()
+    assert np.array_equal(rangeedge.distanceTransform(z > 1.2, dst=dst), expected)
+
+
+@pytest.mark.parametrize("wait", [0.02, 0.1])
+def test_python_may_end_while_kernels_work(wait):
+    program = f"""
+import sys; sys.path.insert(0, {str(ROOT)!r})
+import numpy as np, rangeedge, threading, time
+z = np.random.default_rng(0).normal(1, .1, (2000, 2000))
+for _ in range(2):
+    threading.Thread(target=lambda: rangeedge.detectEdges(z, noise=1e-4), daemon=True).start()
+time.sleep({wait})
+"""
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
+    assert (run.returncode, run.stderr) == (0, "")

@@ -1,0 +1,197 @@
+"""Why a pixel is an edge or none: the answer is that of the detector, and what is said to turn it does."""
+
+import warnings
+
+import cv2
+import numpy as np
+import pytest
+
+import rangeedge
+from rangeedge import detectEdges, drawExplanation, explainPixel
+from rangeedge.app.cli import main
+from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
+
+CAMERA = pinholeCamera(np.array([[80.0, 0, 39.5], [0, 80.0, 29.5], [0, 0, 1]]), (80, 60))
+K = CAMERA.geometry["K"]
+STAGES = ["no data", "no cut", "candidate", "significance", "far side", "threshold", "stray", "line", "thinned", "edge"]
+
+
+def depths(seed, noise=0.002):
+    """A box before a wall, in millimetres, with some holes."""
+    rng = np.random.default_rng(seed)
+    axes = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    scene = [plane((0, 0, 1.3), (0.1, -0.4, -1)), box((0, 0, 0.9), (0.25, 0.2, 0.15), axes)]
+    depth = renderScene(scene, CAMERA).depth + rng.normal(0, noise, (60, 80))
+    depth[rng.integers(0, 60, 20), rng.integers(0, 80, 20)] = 0
+    return np.rint(1000 * depth).astype(np.uint16)
+
+
+CASES = {
+    "default": (depths(0), {"K": K}),
+    "thresholds": (depths(1), {"K": K, "jumpThreshold": 0.25, "creaseThreshold": 60, "noise": 0.002}),
+    "hysteresis": (depths(2), {"K": K, "creaseThreshold": 80, "hysteresis": 0.5, "minLength": 12}),
+    "noisy": (depths(3, 0.02), {"K": K}),
+    "boundary": (depths(4), {"K": K, "boundaryEdges": True}),
+    "lines": (depths(5, 0.008), {"K": K, "lineSignificance": 30, "dynamic": True}),
+    "heights": (-depths(6) / 1000.0, {"heightMap": True, "pixelSize": 0.01, "noise": 0.002}),
+    "rows": (depths(7), {"K": K, "directions": 1}),
+    "paper": (depths(8), {"K": K, "fit": 1, "maxShift": 0, "mergeSignificance": 0, "minSignificance": 0}),
+}
+
+
+def near_edges(edges, every):
+    """Pixels on and beside edges, and some far from them."""
+    near = cv2.dilate(edges, np.ones((5, 5), np.uint8)) > 0
+    near[::7, ::7] = True
+    return list(zip(*np.nonzero(near.T), strict=True))[::every]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_agrees_with_the_map(name):
+    src, options = CASES[name]
+    edges = detectEdges(src, **options)
+    changed = {True: 0, False: 0}
+    for x, y in near_edges(edges, 4):
+        why = explainPixel(src, int(x), int(y), **options)
+        assert why.edge == (edges[y, x] > 0)
+        assert why.edge == (why.stage == "edge")
+        assert why.stage in STAGES
+        if why.change:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", rangeedge.RangeEdgeWarning)  # of thresholds above every depth
+                turned = detectEdges(src, **{**options, **why.change})[y, x] > 0
+            assert turned != why.edge, (x, y, why.change)
+            changed[why.edge] += 1
+        if why.passes:
+            assert edges[why.passes[::-1]] > 0
+        elif not why.edge:
+            assert not edges[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].any()
+    assert changed[True] > 0.9 * np.count_nonzero(edges) / 4 * 0.8
+
+
+@pytest.mark.parametrize("name", ["default", "heights", "noisy"])
+def test_lines_are_those_of_edge_points(name):
+    """Cuts that passed are the points of `edgePoints` on the lines through the pixel, but for the second adaptation."""
+    src, options = CASES[name]
+    own = {n: v for n, v in options.items() if n in rangeedge.ScanLineParams.options}
+    points = rangeedge.edgePoints(src, **own)
+    for x, y in ((40, 30), (33, 22), (50, 40)):
+        if src[y, x] == 0:
+            continue
+        why = explainPixel(src, x, y, reach=100, **options)
+        assert [line.direction for line in why.lines] == [1, 2, 4, 8]
+        for line in why.lines:
+            on = points[points["direction"] == line.direction]
+            if line.direction == 1:
+                on = on[on["y"] == y]
+            elif line.direction == 2:
+                on = on[on["x"] == x]
+            else:
+                sign = 1 if line.direction == 4 else -1
+                on = on[np.abs((on["x"] - x) + sign * (on["y"] - y)) < 1e-3]
+            passed = [cut for cut in line.cuts if not cut.test]
+            assert len(passed) == len(on)
+            assert np.allclose(sorted(cut.significance for cut in passed), np.sort(on["significance"]), rtol=1e-5)
+
+
+def test_samples_and_curves_of_a_roof():
+    roof = 0.2 * np.abs(np.arange(64) - 30.3) * np.ones((48, 1))
+    row = explainPixel(roof, 30, 20, noise=0.001, directions=1).lines[0]
+    assert row.name == "row"
+    assert row.samples["x"][row.at] == 30
+    assert row.samples["y"][row.at] == 20
+    assert np.allclose(row.samples["depth"], roof[20, 6:55])
+    assert np.allclose(row.samples["fittedDepth"], row.samples["depth"], atol=1e-9)
+    assert row.segments["first"].tolist() == [-6, 25]
+    assert row.segments["last"].tolist() == [24, 57]
+    (cut,) = row.cuts
+    assert (cut.x, cut.y) == pytest.approx((30.3, 20))
+    assert cut.crease == pytest.approx(2 * np.degrees(np.arctan(0.2)), abs=1e-5)
+    assert (cut.before, cut.after) == ((30, 20), (31, 20))
+
+
+def test_every_stage_by_hand():
+    step = np.where(np.arange(40) < 20, 1.0, 1.25) * np.ones((30, 1))
+    step[3, 3] = np.nan
+    step[:, 35:] = 2.0
+    explained = {
+        (19, 15): "edge",
+        (20, 15): "far side",
+        (5, 15): "no cut",
+        (3, 3): "no data",
+    }
+    for (x, y), stage in explained.items():
+        assert explainPixel(step, x, y, noise=0.001).stage == stage
+    assert explainPixel(step, 19, 15, 0.3, noise=0.001).stage == "threshold"
+    assert explainPixel(step, 19, 15, 0.3, noise=0.001).change == {"jumpThreshold": 0.249}
+    assert explainPixel(step, 19, 15, noise=0.001, minLength=31).change == {"minLength": 30}
+    weak = explainPixel(step, 19, 15, noise=0.001, lineSignificance=1e6)
+    assert (weak.stage, list(weak.change)) == ("line", ["lineSignificance"])
+    assert weak.value < weak.limit == 1e6
+    lost = explainPixel(step, 19, 15, noise=0.001, minSignificance=1e4)
+    assert (lost.stage, lost.limit) == ("significance", 1e4)
+    assert lost.change["minSignificance"] < lost.value
+
+
+def test_faint_crease_names_its_significance():
+    rng = np.random.default_rng(0)
+    roof = 0.02 * np.abs(np.arange(64) - 30.0) * np.ones((48, 1)) + rng.normal(0, 0.05, (48, 64))
+    stages = {explainPixel(roof, x, 24, noise=0.05).stage for x in range(26, 36)}
+    assert "edge" not in stages
+
+
+def test_panorama():
+    """A scanner that turns in a square room: the pixel is found in its sector."""
+    turn, rise = np.meshgrid(np.linspace(-np.pi, np.pi, 720, endpoint=False), np.linspace(0.3, -0.3, 16))
+    rays = np.stack([np.cos(turn) * np.cos(rise), np.sin(turn) * np.cos(rise), np.sin(rise)], axis=-1)
+    room = rays * (3 / np.abs(rays[..., :2]).max(axis=-1, keepdims=True))
+    edges = detectEdges(room, noise=0.001)
+    corners = np.flatnonzero(edges[8])
+    assert np.allclose(corners, [90, 270, 450, 630], atol=1)
+    for x in corners.tolist():
+        why = explainPixel(room, x, 8, noise=0.001)
+        assert why.edge
+        row = why.lines[0]
+        assert (row.samples["x"][row.at], row.samples["y"][row.at]) == (x, 8)
+        assert any(abs(cut.x - x) < 1 and not cut.test for cut in row.cuts)
+
+
+def test_words_and_picture():
+    src, options = CASES["default"]
+    why = explainPixel(src, 40, 30, **options)
+    text = str(why)
+    assert text.startswith("Pixel (40, 30), ")
+    assert all(f"\n{name}: " in text for name in ("row", "column", "diagonal 45", "diagonal 135"))
+    picture = drawExplanation(why)
+    assert picture.shape[0] > 700
+    assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 50
+    assert np.array_equal(cv2.imdecode(np.frombuffer(why._repr_png_(), np.uint8), 1), picture)
+    without = explainPixel(src, *np.argwhere(src.T == 0)[0].tolist(), **options)
+    assert (without.stage, without.lines) == ("no data", ())
+    assert drawExplanation(without).ndim == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [((80, 3), "80 x 60"), ((-1, 3), "`x`"), ((1.5, 3), "`x`"), ((3, 60), "80 x 60")],
+)
+def test_bad_pixels(arguments, words):
+    with pytest.raises(rangeedge.error, match=words):
+        explainPixel(depths(0), *arguments, K=K)
+    with pytest.raises(rangeedge.error, match="reach"):
+        explainPixel(depths(0), 1, 1, K=K, reach=0)
+    with pytest.raises(rangeedge.error, match="explanation"):
+        drawExplanation(None)
+
+
+def test_command(tmp_path, capsys):
+    cv2.imwrite(str(tmp_path / "depth.png"), depths(0))
+    command = ["explain", str(tmp_path / "depth.png"), "-K", "80,80,39.5,29.5", "--at", "40,30"]
+    assert main([*command, "--out", str(tmp_path / "why.png")]) == 0
+    assert capsys.readouterr().out == f"{explainPixel(depths(0), 40, 30, K=K)}\n"
+    assert cv2.imread(str(tmp_path / "why.png")) is not None
+    assert main([*command[:-1], "400,30"]) == 2
+    assert "80 x 60" in capsys.readouterr().err
+    for wrong in ("40", "a,b", "40,30,1"):
+        with pytest.raises(SystemExit):
+            main([*command[:-1], wrong])

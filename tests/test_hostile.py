@@ -1,0 +1,166 @@
+"""Arguments and surroundings that nobody means: all that comes of them is `rangeedge.error`."""
+
+import os
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import rangeedge
+from rangeedge.batch import detectBatch
+
+ROOT = Path(rangeedge.__file__).parents[1]
+HUGE = 10**400  # beyond double precision
+HUGER = 10**5000  # beyond what Python prints
+DEPTH = np.where(np.arange(60) < 30, 1.0, 2.0) * np.ones((40, 1))
+
+
+class Unspeakable:
+    def __repr__(self):
+        raise KeyError("no")
+
+
+class NoPath(os.PathLike):
+    def __fspath__(self):
+        return 5
+
+
+@pytest.mark.parametrize(
+    "value", [HUGE, -HUGE, HUGER, Unspeakable(), float("nan"), 1j, "1", True], ids=lambda value: type(value).__name__
+)
+@pytest.mark.parametrize(
+    "name", ["eps", "noise", "depthFactor", "pixelSize", "K", "maxShift", "directions", "minLength"]
+)
+def test_options_that_are_no_numbers(name, value):
+    with pytest.raises(rangeedge.error, match=f"`{name}` must be"):
+        rangeedge.detectEdges(DEPTH, **{name: value})
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: rangeedge.edgeStrength(DEPTH, K=(HUGE, 1, 1, 1)),
+        lambda: rangeedge.edgeStrength(DEPTH, K=(1, 1, 1, 1), distCoeffs=[HUGE] * 4),
+        lambda: rangeedge.edgeStrength(DEPTH, origin=(HUGE, 0, 0)),
+        lambda: rangeedge.strengthImage(DEPTH, HUGE),
+        lambda: rangeedge.selectEdges(DEPTH, DEPTH, HUGE, 1.0),
+        lambda: rangeedge.NoiseModel(HUGE, 0, 0),
+        lambda: rangeedge.splitScanLine(DEPTH[0], 1, [[1], [2, 3]]),
+        lambda: rangeedge.splitScanLine(DEPTH[0], 1, Unspeakable()),
+        lambda: rangeedge.imreadRange(NoPath()),
+        lambda: rangeedge.imreadRange(b"x.png"),
+        lambda: rangeedge.imreadRange("\ud800.png"),
+        lambda: rangeedge.imreadRange("\0.png"),
+        lambda: rangeedge.imwriteRange("\ud800.tiff", DEPTH),
+        lambda: rangeedge.writeLines("\ud800.csv", rangeedge.linkEdges(DEPTH)),
+        lambda: rangeedge.writeLines(b"x.csv", rangeedge.linkEdges(DEPTH)),
+        lambda: list(detectBatch([NoPath()], "out")),
+        lambda: list(detectBatch(["x"], NoPath())),
+    ],
+)
+def test_odd_values(call):
+    with pytest.raises(rangeedge.error):
+        call()
+
+
+def test_infinite_values_that_are_invalid_may_be_beyond_double_precision():
+    same = rangeedge.detectEdges(DEPTH, invalid=(HUGE, (-HUGE, -1)))
+    assert np.array_equal(same, rangeedge.detectEdges(DEPTH))
+
+
+@pytest.mark.parametrize("text", ["caf\udce9.png", "\ud800\0\n\U0001f600", "\0", ""])
+def test_titles_of_any_characters(text):
+    strength, thin = rangeedge.edgeStrength(DEPTH), rangeedge.detectEdges(DEPTH)
+    plain = rangeedge.drawOverview(DEPTH, strength, thin, title="x")
+    assert rangeedge.drawOverview(DEPTH, strength, thin, title=text).shape == plain.shape
+
+
+@pytest.mark.parametrize("name", ["a\udcff", "a\0b", "<a>", "1", "a:b", "a\nb", 5])
+def test_nodes_of_names_that_no_storage_can_hold(name):
+    fs = cv2.FileStorage(".yml", cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
+    with pytest.raises(rangeedge.error, match="`name` must be letters"):
+        rangeedge.createScanLineDetector().write(fs, name)
+
+
+@pytest.mark.parametrize("separation", [1e-60, 1e-45, 1e-38, 0.5, 0.99])
+@pytest.mark.parametrize("least", [1e-60, 1e-45, 1.0, 1e38, 1e300])
+def test_seeds_of_parameters_that_vanish_in_single_precision(separation, least):
+    far = rangeedge.distanceTransform(np.zeros((40, 60), np.uint8))
+    count, markers = rangeedge.extractSeeds(far, separation=separation, minDistance=least)
+    assert count == 2  # with the background
+    assert (markers == 1).all()
+
+
+@pytest.mark.parametrize("method", [rangeedge.SALIENCE_MULTIPLICATIVE, rangeedge.SALIENCE_ADDITIVE])
+def test_saliences_that_change_meanwhile(method):
+    """Whatever comes of it, it comes."""
+    rng = np.random.default_rng(0)
+    salience = rng.random((200, 300)).astype(np.float32)
+    stop = threading.Event()
+
+    def write():
+        while not stop.is_set():
+            salience[rng.integers(0, 200, 500), rng.integers(0, 300, 500)] = [np.nan, 0.5, 0][int(rng.integers(3))]
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        for _ in range(60):
+            try:
+                rangeedge.salienceDistanceTransform(salience, method)
+            except rangeedge.error:
+                salience[:] = 0.5
+    finally:
+        stop.set()
+        writer.join()
+
+
+def unaligned(values):
+    raw = np.empty(values.nbytes + 1, np.uint8)[1:]
+    raw[:] = np.ascontiguousarray(values).view(np.uint8).ravel()
+    result = raw.view(values.dtype).reshape(values.shape)
+    assert not result.flags.aligned
+    return result
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64, np.uint16])
+def test_unaligned_arrays_give_what_aligned_ones_do(dtype):
+    z = (DEPTH * 1000).astype(dtype)
+    for function in (rangeedge.detectEdges, rangeedge.segmentRegions, rangeedge.estimateNoise):
+        assert np.array_equal(function(z), function(unaligned(z)))
+    x = np.linspace(0, 1, z.size, dtype=np.float32).reshape(z.shape)
+    assert np.array_equal(rangeedge.salienceDistanceTransform(x), rangeedge.salienceDistanceTransform(unaligned(x)))
+    labels = rangeedge.segmentRegions(z)
+    assert np.array_equal(rangeedge.growRegions(z, labels), rangeedge.growRegions(unaligned(z), unaligned(labels)))
+
+
+@pytest.mark.parametrize("offset", [1e4, 5e5, 5e6])
+@pytest.mark.parametrize("points", [False, True])
+def test_steps_of_a_centimetre_on_heights_far_above_zero(offset, points):
+    v, u = np.mgrid[:120, :160]
+    relief = np.where(u < 80, 0, 0.01) + np.random.default_rng(0).normal(0, 0.0005, u.shape)
+    source = np.dstack([u * 0.1, v * 0.1, relief + offset]) if points else relief + offset
+    for options in ({"noise": 0.0005}, {}):
+        labels = rangeedge.segmentRegions(source, heightMap=True, **options)
+        assert labels.max() == 2
+        assert np.count_nonzero(rangeedge.detectEdges(source, heightMap=True, **options)[10:110, 78:82]) >= 100
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no full device")
+@pytest.mark.parametrize("command", ["detect", "segment", "lines", "batch"])
+def test_commands_whose_output_has_no_room(command, tmp_path):
+    cv2.imwrite(str(tmp_path / "x.png"), (DEPTH * 1000).astype(np.uint16))
+    with open("/dev/full", "w") as full:
+        run = subprocess.run(
+            [sys.executable, "-m", "rangeedge", command, "x.png", "-K", "50,50,30,20", "--out", "out"],
+            stdout=full, stderr=subprocess.PIPE, cwd=tmp_path, text=True, check=False,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+        )  # fmt: skip
+    assert run.returncode == 1
+    assert run.stderr.startswith("rangeedge: error: cannot write")
+    assert len(run.stderr.splitlines()) == 1
+    assert (tmp_path / "out").exists()
