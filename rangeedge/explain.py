@@ -244,13 +244,14 @@ class _Case:
             text = f"A stray crease: of the nine pixels around it {count} reach creaseThreshold, {_COMPANY} are needed."
             return _Verdict("stray", text, count, _COMPANY, (lower, {**lower, **_EVERYTHING}))
         _, labels = cv2.connectedComponents(lines)
-        line = labels == labels[at]
-        length = 1 + max(int(np.ptp(places)) for places in np.nonzero(line))
+        length = _length(labels == labels[at])
         if length < own.minLength:
             text, shorter = f"Its line is {length} pixels long; minLength is {own.minLength}.", {"minLength": length}
             return _Verdict("line", text, length, own.minLength, (shorter, {**shorter, "lineSignificance": 0.0}))
+        _, labels = cv2.connectedComponents(cv2.dilate(lines, np.ones((3, 3), np.uint8)))
+        line = (labels == labels[at]) & (lines > 0)
         squares = np.square(self.strength.significance[line], dtype=np.float64)
-        whole = float(np.sqrt(squares.mean() * length / _USUAL_LENGTH))
+        whole = float(np.sqrt(squares.mean() * _length(line) / _USUAL_LENGTH))
         if whole < own.lineSignificance:
             text = f"The significance of its line is {whole:.3g}; lineSignificance is {own.lineSignificance:g}."
             return _Verdict("line", text, whole, own.lineSignificance, ({"lineSignificance": _below(whole)},))
@@ -300,6 +301,11 @@ def _for_cut(cut: Cut) -> Iterator[dict[str, Any]]:
             yield {"minSignificance": least}
             yield {"minSignificance": least, "lineSignificance": 0.0}
             yield {"minSignificance": least, **lower, **_EVERYTHING}
+
+
+def _length(pixels: np.ndarray) -> int:
+    """The longer side of their bounding box."""
+    return 1 + max(int(np.ptp(places)) for places in np.nonzero(pixels))
 
 
 def _with(options: Any, change: Mapping[str, Any]) -> Any:
