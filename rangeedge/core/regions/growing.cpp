@@ -274,10 +274,16 @@ int Grower::over_pixels(int rounds, bool refit) {
 
 void Grower::adjust_borders() {
     front_.clear();
-    patches_.for_borders(0, image_.rows(), [&](int p) {
-        for (const int q : {p + 1, p + image_.stride()})
-            if (patches_[p] && patches_[q] && patches_[p] != patches_[q]) wait(p), wait(q);
+    std::vector<std::vector<int>> found(static_cast<std::size_t>(patches_.team().size()));
+    parallel_for(image_.rows(), patches_.team(), [&](int first, int last, int thread) {
+        patches_.for_borders(first, last, [&](int p) {
+            for (const int q : {p + 1, p + image_.stride()})
+                if (patches_[p] && patches_[q] && patches_[p] != patches_[q])
+                    for (const int of_pair : {p, q}) found[static_cast<std::size_t>(thread)].push_back(of_pair);
+        });
     });
+    for (const auto& of_thread : found)
+        for (const int p : of_thread) wait(p);
     for (int round = 0; round < most_adjustments && !front_.empty(); ++round) {
         choices_.resize(front_.size());
         for_front([&](std::size_t k) {
