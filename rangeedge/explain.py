@@ -62,15 +62,11 @@ class Explanation(NamedTuple):
     def __str__(self) -> str:
         return "\n".join(_said(self))
 
-    def _repr_html_(self) -> str:
-        from html import escape
-
-        return f"<pre>{escape(str(self))}</pre>"
-
     def _repr_png_(self) -> bytes:
         from .draw import drawExplanation
+        from .draw.shown import as_png
 
-        return cv2.imencode(".png", drawExplanation(self))[1].tobytes()
+        return as_png(drawExplanation(self))
 
 
 @takes(DETECTION)

@@ -46,6 +46,11 @@ class Segments(NamedTuple):
     def __repr__(self) -> str:
         return f"<{len(self.segments)} segments, {len(self.vertices)} vertices>"
 
+    def _repr_png_(self) -> bytes:
+        from .draw.shown import of_segments
+
+        return of_segments(self)
+
 
 @public
 def fitSegments(
@@ -76,7 +81,7 @@ def fitSegments(
     -------
     segments : structured ndarray
         ends (2, 3), in the unit of the chains, and pixels (2, 2), the same in the image; direction, a unit vector from
-        the first to the second end; length; kind (EDGE_JUMP, EDGE_CONVEX or EDGE_CONCAVE); jump; dihedral, the angle in
+        the first to the second end; length; kind, that of the chain; jump; dihedral, the angle in
         degrees between two faces that meet, through the solid: below 180 of a convex, above of a concave edge, NaN of a
         jump; rms, of the distances of points from the line before they were averaged; endDeviation, the standard
         deviation of an end across the line, and directionDeviation, that of the direction in degrees, both of the

@@ -1,8 +1,11 @@
-"""What a significance of k means: how many steps of noise alone exceed k deviations, against the normal law.
+"""
+What a significance of k means
+==============================
 
     python samples/calibration.py [--seed 0] [--out DIR]
 
-Noise of several kinds without any edge. `estimateNoise` measures how much the slopes of straight lines fitted to n
+How many steps of noise alone exceed k deviations, against the normal law: noise of several kinds without any edge.
+`estimateNoise` measures how much the slopes of straight lines fitted to n
 pixels on either side of a place are off, and their values at the common border; the table has the share of places where
 these differ by more than k deviations of the estimate, divided by what a normal deviate has. 1 is right.
 Needs matplotlib and SciPy.

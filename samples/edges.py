@@ -1,34 +1,49 @@
-"""Edges of a range image by kind, beside what cv2.Canny finds in the same depths.
+"""
+Edges by kind, beside cv2.Canny
+===============================
 
     python samples/edges.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
 
 To Canny a crease between two surfaces is no edge, and a jump that counts nearby is lost in the noise farther away.
 """
 
+import argparse
+from pathlib import Path
+
 import cv2
 import numpy as np
-from common import load, parser, relief, sheet, write
 
 import rangeedge
+from rangeedge.synthetic import demoScene, kinectCamera, kinectNoise, renderScene
 
 
 def main(argv=None):
-    args = parser(__doc__).parse_args(argv)
-    src, geometry = load(args)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("image", nargs="?", help="range image; default: a rendered one")
+    parser.add_argument("-K", type=lambda text: [float(f) for f in text.split(",")], help="fx,fy,cx,cy of a camera")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for what is written (default: out)")
+    args = parser.parse_args(argv)
+    src, geometry = load(args.image, args.K)
+    args.out.mkdir(parents=True, exist_ok=True)
 
     edges, strength = rangeedge.detectEdgesWithStrength(src, **geometry)
+    canny = cv2.Canny(grey_levels(src), 40, 80)
     print(f"{np.count_nonzero(edges)} edge pixels")
 
-    view = relief(src, geometry)
-    canny = cv2.Canny(grey_levels(src), 40, 80)
-    write(
-        args.out,
-        "edges.png",
-        sheet(
-            ("cv2.Canny of the depths", rangeedge.drawEdges(view, canny)),
-            ("rangeedge: jump red, convex yellow, concave blue", rangeedge.drawEdges(view, edges, strength.kind)),
-        ),
-    )
+    pictures = [
+        ("cv2.Canny of the depths (white: of no known kind)", rangeedge.drawEdges(src, canny, **geometry)),
+        ("rangeedge.detectEdges", rangeedge.drawEdges(src, edges, strength.kind, **geometry)),
+    ]
+    cv2.imwrite(str(args.out / "edges.png"), rangeedge.drawPanels(pictures, 2, key=True))
+    print(args.out / "edges.png")
+
+
+def load(name, K):
+    """The image of that name, or boxes, a roof and curved solids on a table, as a Kinect would see them."""
+    if name is None:
+        scan = kinectNoise(renderScene(demoScene(), kinectCamera()))
+        return scan.src, scan.geometry
+    return rangeedge.imreadRange(name).withGeometry(**({} if K is None else {"K": K}))
 
 
 def grey_levels(src):

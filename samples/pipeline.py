@@ -1,20 +1,24 @@
-"""Where could a suction gripper hold something? From a frame of a depth camera to picking candidates.
+"""
+Where could a gripper hold something?
+=====================================
 
     python samples/pipeline.py [IMAGE -K fx,fy,cx,cy] [--out DIR]
 
-`candidates` is the step to drop in between camera and robot: it takes a frame as the driver delivers it, and returns
-places where a suction cup fits on one surface, each with the normal there. Surfaces that leave the picture, such as the
-table, are no objects.
+From a frame of a depth camera to places for a suction cup. `candidates` is the step to drop in between camera and
+robot: it takes a frame as the driver delivers it, and returns places where a suction cup fits on one surface, each
+with the normal there. Surfaces that leave the picture, such as the table, are no objects.
 """
 
+import argparse
 import csv
+from pathlib import Path
 from typing import NamedTuple
 
 import cv2
 import numpy as np
-from common import load, parser, relief, write
 
 import rangeedge
+from rangeedge.synthetic import demoScene, kinectCamera, kinectNoise, renderScene
 
 
 class Candidate(NamedTuple):
@@ -32,7 +36,7 @@ def candidates(depth, K, depthFactor=1000.0, cup=0.015, unevenness=0.003):
     labels = cv2.medianBlur(labels.astype(np.uint16), 5)  # pixels without data here and there do no harm
     inside = (cv2.dilate(labels, np.ones((3, 3))) == labels) & (cv2.erode(labels, np.ones((3, 3))) == labels)
     distance = rangeedge.distanceTransform(~inside)
-    points = points_of(depth, K, depthFactor)
+    points = rangeedge.backproject(depth, K=K, depthFactor=depthFactor)
     outermost = np.concatenate([labels[0], labels[-1], labels[:, 0], labels[:, -1]])
     found = []
     for label in np.setdiff1d(labels, [0, *outermost]):
@@ -42,14 +46,6 @@ def candidates(depth, K, depthFactor=1000.0, cup=0.015, unevenness=0.003):
             center, normal, spread = place_at(points, x, y, cup / pixel)
             found.append(Candidate(center, normal, distance[y, x] * pixel, spread))
     return sorted((c for c in found if c.unevenness <= unevenness), key=lambda c: c.center[2])
-
-
-def points_of(depth, K, depthFactor):
-    """Points (H, W, 3) of a depth image, the integers of which `depthFactor` divides; NaN without data."""
-    z = depth / depthFactor if depth.dtype.kind in "ui" else depth.astype(np.float64)
-    z = np.where(z > 0, z, np.nan)
-    y, x = np.indices(depth.shape)
-    return np.dstack([(x - K[0, 2]) / K[0, 0] * z, (y - K[1, 2]) / K[1, 1] * z, z])
 
 
 def place_at(points, x, y, radius):
@@ -83,25 +79,37 @@ def pixels(points, K):
 
 
 def main(argv=None):
-    arguments = parser(__doc__)
-    arguments.add_argument(
-        "--cup", type=float, default=0.015, help="radius of the suction cup, metres (default: 0.015)"
-    )
-    args = arguments.parse_args(argv)
-    depth, geometry = load(args)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("image", nargs="?", help="depth image; default: a rendered one")
+    parser.add_argument("-K", type=lambda text: [float(f) for f in text.split(",")], help="fx,fy,cx,cy of the camera")
+    parser.add_argument("--cup", type=float, default=0.015, help="radius of the suction cup, metres (default: 0.015)")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for what is written (default: out)")
+    args = parser.parse_args(argv)
+    depth, geometry = load(args.image, args.K)
     if "K" not in geometry:
-        arguments.error("a depth image of a pinhole camera is needed: give -K fx,fy,cx,cy")
+        parser.error("a depth image of a pinhole camera is needed: give -K fx,fy,cx,cy")
+    args.out.mkdir(parents=True, exist_ok=True)
 
-    found = candidates(depth, geometry["K"], geometry.get("depthFactor", 1000.0), args.cup)
+    K = rangeedge.ScanLineParams(K=geometry["K"]).K
+    found = candidates(depth, K, geometry.get("depthFactor", 1000.0), args.cup)
     print(f"{len(found)} candidates")
 
-    picture = draw(relief(depth, geometry), found, geometry["K"], args.cup)
-    write(args.out, "candidates.png", picture)
+    relief = rangeedge.drawEdges(depth, np.zeros(depth.shape, np.uint8), **geometry)
+    cv2.imwrite(str(args.out / "candidates.png"), draw(relief, found, K, args.cup))
+    print(args.out / "candidates.png")
     with open(args.out / "candidates.csv", "w", newline="") as file:
         rows = csv.writer(file)
         rows.writerow(["x", "y", "z", "normal_x", "normal_y", "normal_z", "free", "unevenness"])
         rows.writerows([f"{v:.4f}" for v in (*c.center, *c.normal, c.free, c.unevenness)] for c in found)
     print(args.out / "candidates.csv")
+
+
+def load(name, K):
+    """The image of that name, or boxes, a roof and curved solids on a table, as a Kinect would see them."""
+    if name is None:
+        scan = kinectNoise(renderScene(demoScene(), kinectCamera()))
+        return scan.src, scan.geometry
+    return rangeedge.imreadRange(name).withGeometry(**({} if K is None else {"K": K}))
 
 
 if __name__ == "__main__":

@@ -166,7 +166,6 @@ def test_words_and_picture():
     assert picture.shape[0] > 700
     assert len(np.unique(picture.reshape(-1, 3), axis=0)) > 50
     assert np.array_equal(cv2.imdecode(np.frombuffer(why._repr_png_(), np.uint8), 1), picture)
-    assert "<pre>" in why._repr_html_()
     without = explainPixel(src, *np.argwhere(src.T == 0)[0].tolist(), **options)
     assert (without.stage, without.lines) == ("no data", ())
     assert drawExplanation(without).ndim == 3

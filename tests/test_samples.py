@@ -9,12 +9,14 @@ import cv2
 import numpy as np
 import pytest
 
-from rangeedge import imreadRange, imwriteRange
+import rangeedge
+from rangeedge import EDGE_CONVEX, EDGE_JUMP, detectEdges, imreadRange, imwriteRange, readLines
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
 
 SAMPLES = Path(__file__).resolve().parents[1] / "samples"
 PICTURES = {
     "edges": ["edges.png"],
+    "explain": ["explain.png"],
     "thinning": ["thinning.png"],
     "distance_map": ["distance_map.png"],
     "salience_map": ["salience_map.png"],
@@ -22,14 +24,20 @@ PICTURES = {
     "segmentation": ["segmentation.png"],
     "pipeline": ["candidates.png"],
     "box_dimensions": ["box_dimensions.png"],
+    "clean_depth": ["clean_depth.png"],
+    "weld_line": ["weld_line.png"],
+    "roof_ridges": ["roof_ridges.png"],
+    "stair_edges": ["stair_edges.png"],
+    "live": ["live.png"],
 }
+OTHERS = {"calibration", "camera", "common", "elevation", "paper", "ros2_node", "scan_line", "scores", "tune"}
 
 
 @pytest.fixture(autouse=True)
 def from_samples(monkeypatch):
     monkeypatch.syspath_prepend(SAMPLES)
     yield
-    for name in ("calibration", "common", "figure6", "scores", *PICTURES):
+    for name in (*OTHERS, *PICTURES):
         sys.modules.pop(name, None)
 
 
@@ -51,7 +59,7 @@ def image(tmp_path):
 
 
 def test_every_sample_is_tested():
-    assert {path.stem for path in SAMPLES.glob("*.py")} == {"calibration", "common", "figure6", "scores", *PICTURES}
+    assert {path.stem for path in SAMPLES.glob("*.py")} == {*OTHERS, *PICTURES}
 
 
 @pytest.mark.parametrize("name", PICTURES)
@@ -69,8 +77,8 @@ def test_runs_on_an_image(name, image, tmp_path, capsys):
 
 @pytest.mark.parametrize("name", ["edges", "seeds"])
 def test_runs_on_a_grid_without_edges(name, tmp_path):
-    imwriteRange(tmp_path / "flat.npy", np.zeros((60, 80), np.float32))
-    run(name, tmp_path / "flat.npy", "--pixel-size", "0.5", "--height-map", "--out", tmp_path)
+    imwriteRange(tmp_path / "flat.npz", np.zeros((60, 80), np.float32), pixelSize=0.5, heightMap=True)
+    run(name, tmp_path / "flat.npz", "--out", tmp_path)
     assert (tmp_path / PICTURES[name][0]).exists()
 
 
@@ -96,6 +104,41 @@ def test_the_box_is_measured_within_two_millimetres(tmp_path):
     assert np.allclose([length for length, _, _ in sizes], (0.20, 0.25, 0.30), atol=0.002)
 
 
+def test_depths_are_cleaned_better_than_by_filters(tmp_path):
+    found = run("clean_depth", "--out", tmp_path)
+    surfaces, edges, holes, filled = found["cleanDepth"]
+    assert surfaces < found["as measured"][0] / 2
+    assert edges < found["as measured"][1] / 2
+    assert holes < 1.5
+    assert filled > 0.95 * found["inpaint"][3]
+    assert all(surfaces < other[0] for name, other in found.items() if name != "cleanDepth")
+
+
+def test_toes_of_the_weld_are_found_within_twenty_micrometres(tmp_path):
+    left, right = run("weld_line", "--out", tmp_path)
+    for off in (left, right):
+        assert len(off) > 600
+        assert np.sqrt(np.mean(off**2)) < 0.02
+    assert len(readLines(tmp_path / "weld_line.csv")) == 2
+
+
+def test_ridges_and_eaves_lie_on_the_map(tmp_path):
+    off = run("roof_ridges", "--out", tmp_path)
+    assert sorted(len(own) for own in off.values()) == [3, 12]
+    assert max(off[EDGE_CONVEX]) < 0.05
+    assert max(off[EDGE_JUMP]) < 0.25  # a pixel
+    lines = readLines(tmp_path / "roof_ridges.geojson")
+    east, north, _ = np.concatenate([line.points for line in lines]).T
+    assert 358000 < east.min() < east.max() < 358080
+    assert 5811935 < north.min() < north.max() < 5812000
+
+
+def test_steps_are_measured_within_two_millimetres(tmp_path):
+    rises, treads = run("stair_edges", "--out", tmp_path)
+    assert np.allclose(rises, np.full(4, 0.17), atol=0.002)
+    assert np.allclose(treads, np.full(4, 0.28), atol=0.002)
+
+
 def test_pipeline_needs_a_camera(tmp_path, capsys):
     imwriteRange(tmp_path / "flat.npy", np.zeros((60, 80), np.float32))
     with pytest.raises(SystemExit) as end:
@@ -103,18 +146,6 @@ def test_pipeline_needs_a_camera(tmp_path, capsys):
     assert end.value.code == 2
     assert "pinhole camera" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-
-
-def test_geometry_given_replaces_that_of_the_file(tmp_path):
-    common = importlib.import_module("common")
-    depth = np.full((60, 80), 1000, np.uint16)
-    imwriteRange(tmp_path / "grid.npz", depth, pixelSize=(0.5, 0.5), heightMap=True, depthFactor=500)
-    _, geometry = common.load(common.parser("").parse_args([str(tmp_path / "grid.npz"), "-K", "50,50,39.5,29.5"]))
-    assert geometry.keys() == {"K", "depthFactor"}
-    assert geometry["depthFactor"] == 500
-    imwriteRange(tmp_path / "camera.npz", depth, K=np.diag([50.0, 50, 1]))
-    _, geometry = common.load(common.parser("").parse_args([str(tmp_path / "camera.npz"), "--pixel-size", "2"]))
-    assert geometry == {"pixelSize": 2}
 
 
 def test_pipeline_heeds_the_depth_factor(image, tmp_path):
@@ -127,14 +158,20 @@ def test_pipeline_heeds_the_depth_factor(image, tmp_path):
     assert one.count("\n") > 1
 
 
-def test_figure6_prints_and_draws(tmp_path, capsys):
+def test_paper_prints_and_draws(tmp_path, capsys):
     pytest.importorskip("matplotlib")
-    run("figure6", "--frequency", 4, "--pairs", 3, "--sigma", 0, "--out", tmp_path / "new" / "folder")
+    run("paper", "--frequency", 4, "--pairs", 3, "--sigma", 0, "--out", tmp_path / "new" / "folder")
     printed = capsys.readouterr().out
     assert "CREASE_MAX     theory, all 5151 pairs: |E| 6.08 ± 7.23" in printed
     assert "CREASE_NORMAL  theory, all 5151 pairs: |E| 0.00 ± 0.00" in printed
     assert "CREASE_NORMAL  detector, sigma 0, 3 of 3 pairs" in printed
-    assert cv2.imread(str(tmp_path / "new" / "folder" / "figure6.png")).std() > 10
+    for number in (6, 7, 8, 10, 11):
+        assert cv2.imread(str(tmp_path / "new" / "folder" / f"figure{number}.png")).std() > 10
+    quiet = [float(line.split("F ")[1].split(",")[0]) for line in printed.splitlines() if line.startswith("  eps")]
+    assert len(quiet) == 3
+    assert min(quiet) > 0.99
+    off = [float(line.split(": ")[1].split(",")[0]) for line in printed.splitlines() if line.startswith("  adapted")]
+    assert off[0] < 0.5
 
 
 def test_calibration_prints_shares_near_those_of_a_normal_deviate(tmp_path, capsys):
@@ -150,17 +187,82 @@ def test_calibration_prints_shares_near_those_of_a_normal_deviate(tmp_path, caps
 
 
 @pytest.mark.parametrize("argv", [["--frequency", "1"], ["--frequency", "x"], ["--sigma", "-1"]])
-def test_figure6_refuses_bad_options(argv, capsys):
+def test_paper_refuses_bad_options(argv, capsys):
     pytest.importorskip("matplotlib")
     with pytest.raises(SystemExit) as exit_:
-        run("figure6", "--frequency", "3", "--pairs", "1", *argv)
+        run("paper", "--frequency", "3", "--pairs", "1", *argv)
     assert exit_.value.code == 2
     assert "usage" in capsys.readouterr().err
 
 
-def test_scores_prefer_rangeedge(capsys):
-    run("scores")
-    ours, canny, regions = capsys.readouterr().out.splitlines()
+def test_live_shows_every_frame_of_a_recording(tmp_path, capsys):
+    depth = np.full((3, 60, 80), 1500, np.uint16)
+    depth[:, 20:40, 30:50] = 1000
+    np.savez(tmp_path / "walk.npz", depth=depth, K=np.array([[80.0, 0, 39.5], [0, 80, 29.5], [0, 0, 1]]))
+    run("live", tmp_path / "walk.npz", "--out", tmp_path)
+    said = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in said[:3]] == ["frame 0", "frame 1", "frame 2"]
+    assert all("2 regions" in line for line in said[:3])
+
+
+def test_the_node_publishes_the_edges_of_a_bag(tmp_path, capsys):
+    pytest.importorskip("rosbags")
+    from rosbags.highlevel import AnyReader
+
+    run("ros2_node", "--out", tmp_path)
+    assert "edges of 3 images" in capsys.readouterr().out
+    src, geometry = importlib.import_module("common").built_in_scene()
+    edges = detectEdges(src, **geometry)
+    with AnyReader([tmp_path / "edges"]) as reader:
+        messages = [reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()]
+    assert [message.header.stamp.sec for message in messages] == [0, 1, 2]
+    for message in messages:
+        assert message.encoding == "mono8"
+        assert np.array_equal(message.data.reshape(message.height, message.width), edges)
+
+
+def test_scan_line_has_one_strong_candidate(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    run("scan_line", "--out", tmp_path)
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    (creases,) = [[float(word) for word in line[2:]] for line in lines if line[0] == "crease"]
+    assert sorted(creases)[-1] > 30
+    assert sorted(creases)[-2] < 4
+    assert cv2.imread(str(tmp_path / "scan_line.png")).std() > 10
+
+
+def test_tuning_loses_edges_when_everything_must_be_certain(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    run("tune", "--out", tmp_path)
+    recall = [float(line.split()[4]) for line in capsys.readouterr().out.splitlines() if "recall" in line]
+    assert len(recall) == 28
+    assert all(sweep[-1] < 0.7 * max(sweep) for sweep in np.reshape(recall, (4, 7)))
+    assert cv2.imread(str(tmp_path / "tune.png")).std() > 10
+
+
+def test_elevation_has_walls_ridges_and_toes(tmp_path, capsys):
+    run("elevation", "--out", tmp_path)
+    said = dict(line.split(": ") for line in capsys.readouterr().out.splitlines() if line.endswith("pixels"))
+    assert all(int(count.split()[0]) > 150 for count in said.values())
+    assert (tmp_path / "lines.geojson").stat().st_size > 1000
+    assert cv2.imread(str(tmp_path / "elevation.png")).shape[1] > 900
+
+
+def test_camera_runs_frames_through_one_detector(image, tmp_path, capsys):
+    run("camera", "--out", tmp_path)
+    assert capsys.readouterr().out.count("edge pixels in") == 8
+    detector = rangeedge.createScanLineDetector()
+    detector.load(tmp_path / "detector.yml")
+    assert detector.getK()[0, 0] == 525
+    run("camera", image, image, "-K", "180,180,99.5,74.5", "--out", tmp_path)
+    assert capsys.readouterr().out.count("edge pixels in") == 2
+    with pytest.raises(SystemExit):
+        run("camera", image)
+
+
+def test_scores_prefer_rangeedge(tmp_path, capsys):
+    run("scores", "--out", tmp_path)
+    ours, canny, regions, _ = capsys.readouterr().out.splitlines()
     values = [[float(word.split()[-1]) for word in line.split(",")] for line in (ours, canny)]
     assert values[0][0] > 0.98 > values[1][0]
     assert values[0][1] > values[1][1]

@@ -67,3 +67,8 @@ class RangeImage(_SourceAndGeometry):
         extent = f", {values.size} values from {values.min():.6g} to {values.max():.6g}" if values.size else ", no data"
         known = "".join(f", {name}" for name in self.geometry)
         return f"RangeImage({self.src.dtype} of shape {self.src.shape}{extent}{known})"
+
+    def _repr_png_(self) -> bytes:
+        from ..draw.shown import of_image
+
+        return of_image(self.src, self.geometry)
