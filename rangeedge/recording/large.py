@@ -66,7 +66,7 @@ def open_large(path: str) -> LargeImage:
 
 def _geo_tags(page: Page) -> tuple[tuple[int, int, int, Any], ...]:
     """What places the image on the map, as it stands in the file."""
-    tags = []
+    tags: list[tuple[int, int, int, Any]] = []
     for code in _GEO_TAGS:
         if code in page:
             values = page.values(code)
