@@ -113,6 +113,7 @@ class ClosingOptions(TypedDict, total=False):
 class CleaningOptions(TypedDict, total=False):
     K: ArrayLike | str | os.PathLike[str] | None
     distCoeffs: ArrayLike | None
+    imageSize: Sequence[int] | None
     pixelSize: float | Sequence[float] | None
     heightMap: bool
     depthFactor: float

@@ -11,7 +11,8 @@ from ._check import deliver, image8
 from ._option import parsed, takes
 from .frame import Frame
 from .noise import measured_frame
-from .options import CLOSING, Closing, ScanLineParams
+from .options import CLOSING, Closing, Growing, ScanLineParams
+from .regions import seeded_regions
 from .sectors import sectors_of
 from .surfaces import surface_map
 
@@ -19,6 +20,8 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from ._typed import ClosingOptions
+
+_SMOOTH_ANGLE = 5.0  # degrees below which surfaces that meet without an edge go on into each other
 
 
 @takes(CLOSING)
@@ -30,15 +33,17 @@ def closeContours(
     dst: np.ndarray | None = None,
     **options: Unpack[ClosingOptions],
 ) -> np.ndarray:
-    """Close gaps between edges where what they enclose is no single surface.
+    """Close gaps between edges along the lines where surfaces meet or part.
 
     closeContours(edges, src, *[, mask[, dst[, K[, ...]]]]) -> dst
 
-    The 4-connected components of what is no edge are hypotheses of regions. One is verified where a plane, or a
-    quadratic that two planes do not beat, leaves at most ``1 - share`` of its pixels farther off than `tolerance`
-    standard deviations. Inside every other one the edges are dilated by a pixel, and its parts are hypotheses again: so
-    gaps are closed by as much as it takes, region by region, while good regions keep their edges as they are. In the
-    end verified regions grow back over what dilation took, and where two of them meet there is a new edge.
+    Regions grow between the edges as in `segmentRegions`, under a smaller `smoothAngle`. Where edges have gaps, regions
+    of two surfaces are open to each other, and there a line is drawn: along their intersection where one surface passes
+    through the other, else where the pixels of one end and those of the other begin, whichever way the edges on both
+    sides of the gap point. A region counts if at least `share` of its pixels lie within `tolerance` standard deviations
+    of its plane or quadratic: those of the noise, or of most regions where these tell of more. No line is drawn between
+    regions of one surface, and none that is longer than `maxGap`. In the end the 4-connected components of what is no
+    edge are the surfaces.
 
     Parameters
     ----------
@@ -62,10 +67,11 @@ def closeContours(
     rangeedge.error
         If an argument has a wrong type, shape or range.
 
-    References
-    ----------
-    X. Jiang, An adaptive contour closure algorithm and its experimental evaluation, PAMI 22(11), 2000. It verifies
-    planes only; the quadratics, and the test against two planes, are ours.
+    Notes
+    -----
+    The paper names closing (section 7) without describing it. That regions are hypotheses which surfaces verify is the
+    idea of X. Jiang, An adaptive contour closure algorithm and its experimental evaluation, PAMI 22(11), 2000, which
+    dilates edges until it is so; the lines between surfaces are ours.
 
     Examples
     --------
@@ -95,24 +101,14 @@ def _closed(frame: Frame, edges: np.ndarray, closing: Closing) -> np.ndarray:
         for part in parts:
             part.put(whole, _closed(part.frame, part.take(edges), closing))
         return whole
+    regions = seeded_regions(frame, edges, Growing(minArea=closing.minArea, smoothAngle=_SMOOTH_ANGLE))[1]
     kernel_options = _core.ClosureOptions(
         correlation=frame.correlation,
         tolerance=closing.tolerance,
         share=closing.share,
-        dilations=(closing.maxGap + 1) // 2,
+        max_gap=closing.maxGap,
         min_area=closing.minArea,
     )
-    regions = np.empty(frame.shape, np.int32)
-    _core.verified_regions(surface_map(frame, edges), kernel_options, frame.threads, regions)
-    return ((edges != 0) | _meetings(regions)).view(np.uint8) * np.uint8(255)
-
-
-def _meetings(regions: np.ndarray) -> np.ndarray:
-    """Pixels left of or above one of another region."""
-    met = np.zeros(regions.shape, bool)
-    for here, there, at in (
-        (regions[:, :-1], regions[:, 1:], met[:, :-1]),
-        (regions[:-1], regions[1:], met[:-1]),
-    ):
-        at |= (here != there) & (here > 0) & (there > 0)
-    return met
+    lines = np.empty(frame.shape, np.uint8)
+    _core.close_contours(surface_map(frame, edges), regions, kernel_options, frame.threads, lines)
+    return ((edges != 0) | (lines != 0)).view(np.uint8) * np.uint8(255)

@@ -46,12 +46,20 @@ def _as_array(src: Any) -> np.ndarray:
     try:
         if hasattr(src, "__dlpack__") and not hasattr(src, "__array__"):
             return np.from_dlpack(src)
-        if hasattr(src, "__array__"):
+        if hasattr(src, "__array__") or hasattr(src, "__array_interface__"):
             return np.asarray(src)
     except (TypeError, ValueError, RuntimeError, BufferError) as reason:
         raise fail("src", f"{SRC}, on the CPU", f"{type(src).__name__} ({reason})") from None
-    hint = " (imreadRange reads files)" if isinstance(src, str) or hasattr(src, "__fspath__") else ""
-    raise fail("src", SRC, f"{type(src).__name__}{hint}")
+    raise fail("src", SRC, f"{type(src).__name__}{_hint(src)}")
+
+
+def _hint(src: Any) -> str:
+    """What to do about something that is no array."""
+    if src is None:
+        return " (cv2.imread gives None where it finds no image)"
+    if isinstance(src, str) or hasattr(src, "__fspath__"):
+        return " (imreadRange reads files)"
+    return " (numpy.asarray makes an array of it)" if isinstance(src, (list, tuple, memoryview, bytes)) else ""
 
 
 def _of_records(records: np.ndarray) -> np.ndarray:
@@ -73,4 +81,6 @@ def _is_list_of_points(values: np.ndarray) -> bool:
         return False
     if values.ndim == 3:
         return 1 in values.shape[:2] and values.shape[2] in (3, 4) and max(values.shape) > _LONGEST_LINE
+    if values.ndim == 2 and values.shape[0] in (3, 4) and values.shape[1] > _LONGEST_LINE:
+        return True
     return values.ndim == 2 and values.shape[1] in (3, 4) and values.shape[0] > _LEAST_CLOUD

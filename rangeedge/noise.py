@@ -35,8 +35,9 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
     measured likewise: by D = s1 - 2 s2 + s3 and G = z1 - 2 z2 + z3 - (s3 - s1) n / 2 of the slopes s and means z of
     three adjacent fits, which vanish on every quadratic too, and whose deviations for white noise are known. What the
     medians exceed these by are the factors in `fits`, along rows and along columns; |D| by depth tells how the waves of
-    the noise grow with it. Whoever detects edges with the model counts with that; its `correlation` sums it up. A scanner
-    that turns measures each of its pixels for itself: there the noise is white.
+    the noise grow with it. Whoever detects edges with the model counts with that; its `correlation` sums it up.
+
+    A scanner that turns measures each of its pixels for itself: of its points the noise is white.
 
     Parameters
     ----------

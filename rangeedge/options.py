@@ -472,17 +472,17 @@ class Closing(Options):
         "Share of the pixels of a surface that must lie within `tolerance`, in (0, 1].",
     )
     maxGap: int = option(
-        40,
+        120,
         _whole(0),
         "int",
-        "Widest gap to close: edges are dilated by at most half of it.",
+        "Longest gap to close.",
         unit="pixels",
     )
     minArea: int = option(
         50,
         _whole(1),
         "int",
-        "Components of fewer pixels are no hypotheses; no edge is drawn for them.",
+        "Parts of fewer pixels are no surfaces; no edge is drawn around them.",
         unit="pixels",
     )
 

@@ -21,11 +21,17 @@ _FORMATS = {  # of depth cameras
     *((480, 360), (512, 424), (512, 512), (640, 360), (640, 400), (640, 480), (640, 576), (848, 480), (960, 540)),
     *((1024, 768), (1024, 1024), (1280, 720), (1280, 800), (1280, 960), (1280, 1024), (1920, 1080), (1944, 1200)),
 }
-_LEAST_ZEROS = 0.01  # share of the pixels, that zeros stand for no data
+_SEVERAL = 16  # pixels of one value, that may stand for no data
+_HOLES = 0.01  # share of the pixels, that a camera does not see
+_FARTHER = 5.0  # times all others, that a value stands for no data
+_WIDEST = 0.02  # focal length in sides of the image
+_FARTHEST_CENTRE = 3.0  # of the optical axis from the middle, in sides of the image
+_FLAT = 0.1  # of the sides of an image, in units of its values: depths of a camera whose pixels count as 1 apart
 _LEAST_IMAGE = 64 * 64  # pixels of what a camera may have taken
 _FAR_FROM_ZERO = 0.1  # of the median, above which all other depths lie then
 _MOST_DROPPED = 0.1  # share of the points
 _FEW_POINTS = 64  # that may be dropped without a word
+_HALF_TURN = 180.0  # degrees
 _FARTHEST = 1000.0  # metres, that integers are depths in millimetres or the like
 
 
@@ -46,7 +52,11 @@ def question_geometry(src: np.ndarray, frame: Frame, params: ScanLineParams) -> 
     plain = src.ndim == 2 and params.K is None and params.pixelSize is None and not params.heightMap
     if plain and params.invalid is None:
         _refuse_zeros(src)
-    _warn_of_form(src, plain)
+    if params.invalid is None and src.ndim == 2:
+        _warn_of_outlier(src, frame)
+    _warn_of_form(src, frame, plain)
+    if params.K is not None and src.size >= _LEAST_IMAGE:
+        _warn_of_camera(params.K, src.shape)
     if src.dtype.kind in "iu" and params.K is not None:
         _warn_of_factor(frame.ordinate[::8, ::8], params.depthFactor)
 
@@ -56,7 +66,7 @@ def _refuse_zeros(src: np.ndarray) -> None:
     if src.dtype.kind != "f" or src.size < _LEAST_IMAGE:
         return
     zeros = np.count_nonzero(src == 0)
-    if zeros < _LEAST_ZEROS * src.size or np.nanmin(src) < 0:
+    if zeros < _SEVERAL or np.nanmin(src) < 0:
         return
     depths = src[src > 0]
     if len(depths) and depths.min() > _FAR_FROM_ZERO * np.median(depths[np.isfinite(depths)]):
@@ -66,15 +76,56 @@ def _refuse_zeros(src: np.ndarray) -> None:
         )
 
 
-def _warn_of_form(src: np.ndarray, plain: bool) -> None:
+def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
+    """Warn of a value that several pixels have, and that is far from all others: it hardly is a depth."""
+    coarse = src[::4, ::4][frame.valid[::4, ::4] > 0]
+    if src.size < _LEAST_IMAGE or not len(coarse):
+        return
+    for bound in (np.max, np.min):
+        value = bound(src, where=frame.valid > 0, initial=coarse[0])
+        others = coarse[coarse != value].astype(np.float64)
+        if not len(others):
+            continue
+        largest = np.abs(others).max()
+        below = value < 0 <= others.min() and -float(value) > largest
+        if not (largest > 0 and (below or abs(float(value)) / _FARTHER > largest)):
+            continue
+        count = np.count_nonzero(src == value)
+        if count >= _SEVERAL:
+            warn(
+                f"`src` is {value:g} at {count} of {src.size} pixels, far from all others: say invalid={value:g} if"
+                " these have no data, invalid=() if they have"
+            )
+
+
+def _warn_of_camera(K: np.ndarray, shape: tuple[int, ...]) -> None:
+    """Warn of a camera that is hardly given in pixels of the image."""
+    size = np.array([shape[1], shape[0]])
+    if (np.diag(K)[:2] < _WIDEST * size).any() or (np.abs(K[:2, 2] - size / 2) > _FARTHEST_CENTRE * size).any():
+        warn(
+            f"K has the focal lengths {K[0, 0]:g}, {K[1, 1]:g} and the centre {K[0, 2]:g}, {K[1, 2]:g}: hardly in"
+            f" pixels of an image of {shape[1]} x {shape[0]}"
+        )
+
+
+def _warn_of_form(src: np.ndarray, frame: Frame, plain: bool) -> None:
     if src.dtype.kind in "iu" and src.dtype.itemsize == 1:
         warn("`src` has 8 bits, too coarse for edges: pass the depths as the sensor gave them, in 16 bits or floats")
     size = (src.shape[1], src.shape[0])
-    if plain and src.dtype == np.uint16 and (size in _FORMATS or size[::-1] in _FORMATS):
+    if not plain or (size not in _FORMATS and size[::-1] not in _FORMATS):
+        return
+    holes = np.count_nonzero(frame.valid) < (1 - _HOLES) * src.size
+    if src.dtype == np.uint16 or (src.dtype.kind == "f" and holes and 0 < _positive_extent(frame) < _FLAT * min(size)):
         warn(
-            f"`src` looks like the image of a depth camera ({size[0]} x {size[1]}, 16 bits), but K is not given: angles"
-            " and noise are those of a grid with a spacing of 1; give K, or pixelSize where it is a grid"
+            f"`src` looks like the image of a depth camera ({size[0]} x {size[1]}, {src.dtype}), but K is not given:"
+            " angles and noise are those of a grid with a spacing of 1; give K, or pixelSize where it is a grid"
         )
+
+
+def _positive_extent(frame: Frame) -> float:
+    """The range of depths, 0 where some are not positive."""
+    ordinates = frame.ordinate[::8, ::8]
+    return _extent(ordinates, False) if np.nanmax(np.append(ordinates, -np.inf)) < 0 else 0.0
 
 
 def _warn_of_factor(ordinates: np.ndarray, factor: float) -> None:
@@ -88,6 +139,12 @@ def warn_of_dropped(given: int, kept: int) -> None:
     """Warn where points of an image lie behind its viewpoint."""
     if given - kept > max(_MOST_DROPPED * given, _FEW_POINTS):
         warn("more than a tenth of the points lie behind the viewpoint and are left out; say where it is by origin")
+
+
+def warn_of_angle(creaseThreshold: float) -> None:
+    """Warn of an angle that no crease has."""
+    if _HALF_TURN < creaseThreshold <= 2 * _HALF_TURN:
+        warn(f"creaseThreshold={creaseThreshold:g} switches creases off: no angle exceeds 180 degrees")
 
 
 def warn_of_thresholds(frame: Frame, **lengths: object) -> None:

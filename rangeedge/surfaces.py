@@ -52,11 +52,9 @@ def places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[fl
     """
     if frame.samples.ndim == 2:
         return None, None, frame.to_plane
-    axis = np.asarray(frame.axis)
-    across = np.cross((0, 1, 0) if abs(axis[1]) < 0.9 else (1, 0, 0), axis)
-    across /= np.linalg.norm(across)
+    right, down, axis = _plane_axes(frame)
     points = frame.samples.astype(np.float64)
-    x, y = points @ across, points @ np.cross(axis, across)
+    x, y = points @ right, points @ down
     if frame.projective:
         with np.errstate(divide="ignore", invalid="ignore"):
             x, y = x / (points @ axis), y / (points @ axis)
@@ -65,6 +63,27 @@ def places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[fl
     spacing = float(np.median(steps)) if len(steps) else 1.0
     to_plane = (spacing, 0.0, 0.0, 0.0, spacing, 0.0)
     return (x / spacing).astype(np.float32), (y / spacing).astype(np.float32), to_plane
+
+
+def _plane_axes(frame: Frame) -> np.ndarray:
+    """Two directions on the plane of an image of points, and that of view, as rows."""
+    axis = np.asarray(frame.axis)
+    right = np.cross((0, 1, 0) if abs(axis[1]) < 0.9 else (1, 0, 0), axis)
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(axis, right), axis])
+
+
+def in_space(frame: Frame, x: np.ndarray, y: np.ndarray, to_plane: tuple[float, ...], z: np.ndarray) -> np.ndarray:
+    """(..., 3) points seen at places (x, y) of `places` with ordinates z; NaN where z is that of no point."""
+    a, b, c, d, e, f = to_plane
+    u, v = a * x + b * y + c, d * x + e * y + f
+    with np.errstate(divide="ignore", invalid="ignore"):
+        along = np.where(z > 0, 1 / z, np.nan) if frame.projective else -z
+    if frame.projective:
+        u, v = u * along, v * along
+    if frame.samples.ndim == 2:
+        return np.stack([u, v, -along if frame.heightMap else along], axis=-1)
+    return np.stack([u, v, along], axis=-1) @ _plane_axes(frame) + np.asarray(frame.origin)
 
 
 def surfaces_of(frame: Frame, labels: np.ndarray, count: int) -> np.ndarray:

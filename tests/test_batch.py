@@ -2,15 +2,26 @@
 
 import json
 import os
+import sys
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 
-from rangeedge import NoiseModel, error, imwriteRange
+from rangeedge import (
+    NoiseModel,
+    detectEdges,
+    detectEdgesWithStrength,
+    error,
+    imwriteRange,
+    linkEdges,
+    segmentRegions,
+)
 from rangeedge.app.cli import main
-from rangeedge.app.results import EDGE_FILES, plain
-from rangeedge.batch import detectBatch
+from rangeedge.app.lines import LINE_FILES
+from rangeedge.app.results import EDGE_FILES, encoded, plain
+from rangeedge.batch import detectBatch, framesOf, runBatch
 
 K = np.array([[50, 0, 19.5], [0, 50, 14.5], [0, 0, 1]])
 LEDGER = {"manifest.jsonl", ".manifest.jsonl.lock"}  # beside the results
@@ -192,3 +203,121 @@ def test_bad_names(images, tmp_path):
     for out in (None, 5, b"x"):
         with pytest.raises(error, match="detectBatch: `out` must be a file name"):
             detectBatch(images, out)
+
+
+@pytest.fixture
+def stack(tmp_path):
+    """Three frames with the camera of `K`."""
+    depth = np.full((3, 30, 40), 1500, np.uint16)
+    for shift, frame in enumerate(depth):
+        frame[8:20, 10 + shift : 28] = 1000
+    np.savez(tmp_path / "walk.npz", src=depth, K=K)
+    return tmp_path / "walk.npz", depth
+
+
+class TestForms:
+    def lines(self, path):
+        return [json.loads(line) for line in path.read_text().splitlines()]
+
+    def test_files_of_arrays(self, stack, tmp_path):
+        path, depth = stack
+        assert states(runBatch(path, tmp_path / "out", form="npz")) == ["written"] * 3
+        for index, src in enumerate(depth):
+            edges, strength = detectEdgesWithStrength(src, K=K)
+            with np.load(tmp_path / "out" / "walk" / f"000{index}.npz") as found:
+                assert set(found) == {"edges", *strength._fields}
+                assert np.array_equal(found["edges"], edges)
+                assert all(np.array_equal(found[name], values) for name, values in strength._asdict().items())
+
+    def test_regions_and_lines(self, stack, tmp_path):
+        path, depth = stack
+        assert states(runBatch(path, tmp_path / "png", "segment", form="png", minArea=20)) == ["written"] * 3
+        assert states(runBatch(path, tmp_path / "folder", "segment", minArea=20)) == ["written"] * 3
+        assert states(runBatch(path, tmp_path / "lines", "lines", bridge=3.0)) == ["written"] * 3
+        assert states(runBatch(path, tmp_path / "npz", "lines", form="npz")) == ["written"] * 3
+        labels = cv2.imread(str(tmp_path / "png" / "walk" / "0001.png"), cv2.IMREAD_UNCHANGED)
+        assert np.array_equal(labels, segmentRegions(depth[1], K=K, minArea=20))
+        assert (tmp_path / "folder" / "walk" / "0001" / "labels.png").read_bytes() == encoded(".png", labels)
+        assert {file.name for file in (tmp_path / "lines" / "walk" / "0002").iterdir()} == set(LINE_FILES)
+        with np.load(tmp_path / "npz" / "walk" / "0000.npz") as found:
+            assert np.array_equal(found["points"], linkEdges(depth[0], K=K).points)
+
+    def test_the_manifest_says_what_was_done(self, stack, tmp_path):
+        path, depth = stack
+        list(runBatch([path, tmp_path / "missing.png"], tmp_path / "out", form="png", minLength=4))
+        first, *_, last = self.lines(tmp_path / "out" / "manifest.jsonl")
+        edges = np.count_nonzero(detectEdges(depth[0], K=K, minLength=4))
+        assert (first["frame"], first["input"], first["part"]) == ("walk/0000", str(path), "frame 0")
+        assert first["outputs"] == {"walk/0000.png": (tmp_path / "out" / "walk" / "0000.png").stat().st_size}
+        assert first["counts"] == {"edgePixels": edges}
+        assert first["seconds"] > 0
+        expected = {"task": "detect", "form": "png", "minLength": 4, "K": f"float64 array of shape {K.shape}"}
+        assert {**first["parameters"], "K": expected["K"]} == expected
+        assert (last["state"], last["outputs"]) == ("failed", {})
+        assert "missing.png" in last["error"]
+
+    def test_chunks_of_a_store(self, stack, tmp_path):
+        zarr = pytest.importorskip("zarr")
+        path, depth = stack
+        out = tmp_path / "out.zarr"
+        assert states(runBatch(path, out)) == ["written"] * 3
+        group = zarr.open_group(str(out), mode="r")
+        assert sorted(group.array_keys()) == ["crease", "edges", "jump", "kind", "significance"]
+        assert group["edges"].chunks == (1, 30, 40)
+        assert np.array_equal(group["edges"][:], [detectEdges(src, K=K) for src in depth])
+        assert len(self.lines(tmp_path / "out.zarr.manifest.jsonl")) == 3
+        assert states(runBatch(path, out)) == ["skipped"] * 3
+        (out / "jump" / "c" / "1" / "0" / "0").unlink()
+        assert states(runBatch(path, out)) == ["skipped", "written", "skipped"]
+
+    def test_a_store_grows_and_refuses_frames_of_other_sizes(self, stack, tmp_path):
+        zarr = pytest.importorskip("zarr")
+        path, depth = stack
+        np.savez(tmp_path / "walk2.npz", src=depth[:, :20], K=K)
+        (tmp_path / "none.png").write_bytes(b"")
+        out = tmp_path / "out.zarr"
+        assert states(runBatch(path, out, "segment")) == ["written"] * 3
+        inputs = [path, tmp_path / "walk2.npz", tmp_path / "none.png"]
+        items = list(runBatch(inputs, out, "segment"))
+        assert states(items) == ["skipped"] * 3 + ["failed"] * 4
+        assert "40 x 20 pixels, the store has frames of 40 x 30" in items[3].message
+        assert zarr.open_group(str(out), mode="r")["labels"].shape == (7, 30, 40)
+
+    def test_extras_that_are_missing_are_named(self, stack, tmp_path, monkeypatch):
+        monkeypatch.setitem(sys.modules, "zarr", None)
+        with pytest.raises(error, match=r"needs zarr: pip install 'rangeedge\[zarr\]'"):
+            list(runBatch(stack[0], tmp_path / "out.zarr"))
+        (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0\n")
+        for module in ("rosbags", "rosbags.highlevel"):
+            monkeypatch.setitem(sys.modules, module, None)
+        with pytest.raises(error, match=r"needs rosbags: pip install 'rangeedge\[bags\]'"):
+            framesOf(tmp_path / "a.bag")
+
+
+class TestCommand:
+    def argv(self, path, tmp_path, *more):
+        return ["batch", str(path), "--out", str(tmp_path / "out"), *more]
+
+    def test_options_of_each_task(self, stack, tmp_path, capsys):
+        argv = self.argv(stack[0], tmp_path, "--task", "segment", "--form", "png", "--min-area", "20")
+        assert main(argv) == 0
+        assert capsys.readouterr().out.splitlines()[-1] == "3 written, 0 skipped, 0 failed"
+        assert main(self.argv(stack[0], tmp_path, "--min-area", "20")) == 2
+        assert "`minArea` is no option of 'detect'" in capsys.readouterr().err
+
+    def test_a_bar_where_a_person_looks_on(self, stack, tmp_path, capsys, monkeypatch):
+        pytest.importorskip("tqdm")
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+        assert main(self.argv(stack[0], tmp_path, "--form", "png")) == 0
+        said, shown = capsys.readouterr()
+        assert said == "3 written, 0 skipped, 0 failed\n"
+        assert "3/3" in shown
+        assert "frame/s" in shown
+
+    def test_without_tqdm_a_line_a_frame(self, stack, tmp_path, capsys, monkeypatch):
+        monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+        monkeypatch.setitem(sys.modules, "tqdm", None)
+        assert main(self.argv(stack[0], tmp_path, "--form", "png")) == 0
+        said, shown = capsys.readouterr()
+        assert said.count("written ") == 3
+        assert shown == ""

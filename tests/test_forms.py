@@ -148,8 +148,8 @@ def test_what_is_no_value_of_no_data(invalid):
 
 def test_zeros_of_a_plain_image_are_asked_about():
     z = np.full((80, 100), 1.5)
-    z[:20, :30] = 0
-    with pytest.raises(rangeedge.error, match="edgeStrength: `src` is 0 at 600 of 8000 pixels: say invalid=0"):
+    z[:4, :4] = 0
+    with pytest.raises(rangeedge.error, match="edgeStrength: `src` is 0 at 16 of 8000 pixels: say invalid=0"):
         edgeStrength(z)
     assert not edgeStrength(z, noise=0.001, invalid=0).jump.any()
     assert edgeStrength(z, noise=0.001, invalid=()).jump.any()
@@ -157,6 +157,11 @@ def test_zeros_of_a_plain_image_are_asked_about():
 
 
 # Warnings.
+
+
+HOLES = np.zeros(Z.shape, bool)
+HOLES[10:14, 20:25] = True
+CAMERA = np.random.default_rng(5).random((480, 640))
 
 
 @pytest.mark.parametrize(
@@ -167,12 +172,33 @@ def test_zeros_of_a_plain_image_are_asked_about():
         (Z, {"K": K, "eps": 5.0}, "eps=5 exceeds"),
         (Z, {"K": K, "noise": 5.0}, "noise=5 exceeds"),
         ((2000 * Z).astype(np.uint16), {"K": K, "depthFactor": 1.0}, "depthFactor=1 "),
+        (np.where(HOLES, 65535, 2000 * Z).astype(np.uint16), {"K": K}, "`src` is 65535 at 20 of .*invalid=65535"),
+        (np.where(HOLES, -9999, Z), {"heightMap": True}, "`src` is -9999 at 20 of"),
+        (np.where(HOLES, -9999, 3000 * Z), {"heightMap": True}, "`src` is -9999 at 20 of"),
+        (np.where(HOLES, -32767, 100 * Z).astype(np.int16), {"heightMap": True}, "`src` is -32767 at 20 of"),
+        (np.where(HOLES, np.finfo("f4").min, Z).astype("f4"), {"heightMap": True}, "`src` is -3.40282e.38 at 20 of"),
+        (np.where(HOLES, 1e10, Z).astype("f4"), {"K": K}, "`src` is 1e.10 at 20 of"),
+        (Z, {"K": (0.0035, 0.0035, 0.0024, 0.0018)}, "hardly in pixels of an image"),
+        (Z, {"K": (140, 140, 3190, 59.5)}, "hardly in pixels of an image"),
+        (np.where(CAMERA < 0.05, np.nan, 2 + CAMERA / 10), {}, "looks like the image of a depth camera"),
     ],
 )
 def test_what_hardly_fits_is_warned_of(src, options, text):
     with pytest.warns(RangeEdgeWarning, match=text) as found:
         edgeStrength(src, **options)
     assert found[0].filename == __file__
+
+
+def test_values_far_from_others_are_no_matter_where_they_are_said_to_be_one():
+    for values in (0, (0, 65535), ()):
+        edgeStrength(np.where(HOLES, 65535, 2000 * Z).astype(np.uint16), K=K, invalid=values, noise=0.001)
+    edgeStrength(np.where(HOLES, 1e10, Z), K=K, invalid=[(1e9, INF)])
+
+
+def test_an_angle_that_no_crease_has_is_warned_of():
+    with pytest.warns(RangeEdgeWarning, match="creaseThreshold=181 switches creases off"):
+        detectEdges(Z, None, 181.0, K=K)
+    detectEdges(Z, None, INF, K=K)
 
 
 def test_a_threshold_beyond_the_scene_is_warned_of():

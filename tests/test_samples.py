@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge import imreadRange, imwriteRange
+from rangeedge import EDGE_CONVEX, EDGE_JUMP, detectEdges, imreadRange, imwriteRange, readLines
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
 
 SAMPLES = Path(__file__).resolve().parents[1] / "samples"
@@ -25,8 +25,13 @@ PICTURES = {
     "segmentation": ["segmentation.png"],
     "pipeline": ["candidates.png"],
     "box_dimensions": ["box_dimensions.png"],
+    "clean_depth": ["clean_depth.png"],
+    "weld_line": ["weld_line.png"],
+    "roof_ridges": ["roof_ridges.png"],
+    "stair_edges": ["stair_edges.png"],
+    "live": ["live.png"],
 }
-OTHERS = {"calibration", "camera", "elevation", "paper", "scan_line", "scores", "tune"}
+OTHERS = {"calibration", "camera", "common", "elevation", "paper", "ros2_node", "scan_line", "scores", "tune"}
 
 
 @pytest.fixture(autouse=True)
@@ -100,6 +105,41 @@ def test_the_box_is_measured_within_two_millimetres(tmp_path):
     assert np.allclose([length for length, _, _ in sizes], (0.20, 0.25, 0.30), atol=0.002)
 
 
+def test_depths_are_cleaned_better_than_by_filters(tmp_path):
+    found = run("clean_depth", "--out", tmp_path)
+    surfaces, edges, holes, filled = found["cleanDepth"]
+    assert surfaces < found["as measured"][0] / 2
+    assert edges < found["as measured"][1] / 2
+    assert holes < 1.5
+    assert filled > 0.95 * found["inpaint"][3]
+    assert all(surfaces < other[0] for name, other in found.items() if name != "cleanDepth")
+
+
+def test_toes_of_the_weld_are_found_within_twenty_micrometres(tmp_path):
+    left, right = run("weld_line", "--out", tmp_path)
+    for off in (left, right):
+        assert len(off) > 600
+        assert np.sqrt(np.mean(off**2)) < 0.02
+    assert len(readLines(tmp_path / "weld_line.csv")) == 2
+
+
+def test_ridges_and_eaves_lie_on_the_map(tmp_path):
+    off = run("roof_ridges", "--out", tmp_path)
+    assert sorted(len(own) for own in off.values()) == [3, 12]
+    assert max(off[EDGE_CONVEX]) < 0.05
+    assert max(off[EDGE_JUMP]) < 0.25  # a pixel
+    lines = readLines(tmp_path / "roof_ridges.geojson")
+    east, north, _ = np.concatenate([line.points for line in lines]).T
+    assert 358000 < east.min() < east.max() < 358080
+    assert 5811935 < north.min() < north.max() < 5812000
+
+
+def test_steps_are_measured_within_two_millimetres(tmp_path):
+    rises, treads = run("stair_edges", "--out", tmp_path)
+    assert np.allclose(rises, np.full(4, 0.17), atol=0.002)
+    assert np.allclose(treads, np.full(4, 0.28), atol=0.002)
+
+
 def test_pipeline_needs_a_camera(tmp_path, capsys):
     imwriteRange(tmp_path / "flat.npy", np.zeros((60, 80), np.float32))
     with pytest.raises(SystemExit) as end:
@@ -154,6 +194,32 @@ def test_paper_refuses_bad_options(argv, capsys):
         run("paper", "--frequency", "3", "--pairs", "1", *argv)
     assert exit_.value.code == 2
     assert "usage" in capsys.readouterr().err
+
+
+def test_live_shows_every_frame_of_a_recording(tmp_path, capsys):
+    depth = np.full((3, 60, 80), 1500, np.uint16)
+    depth[:, 20:40, 30:50] = 1000
+    np.savez(tmp_path / "walk.npz", depth=depth, K=np.array([[80.0, 0, 39.5], [0, 80, 29.5], [0, 0, 1]]))
+    run("live", tmp_path / "walk.npz", "--out", tmp_path)
+    said = capsys.readouterr().out.splitlines()
+    assert [line.split(":")[0] for line in said[:3]] == ["frame 0", "frame 1", "frame 2"]
+    assert all("2 regions" in line for line in said[:3])
+
+
+def test_the_node_publishes_the_edges_of_a_bag(tmp_path, capsys):
+    pytest.importorskip("rosbags")
+    from rosbags.highlevel import AnyReader
+
+    run("ros2_node", "--out", tmp_path)
+    assert "edges of 3 images" in capsys.readouterr().out
+    src, geometry = importlib.import_module("common").built_in_scene()
+    edges = detectEdges(src, **geometry)
+    with AnyReader([tmp_path / "edges"]) as reader:
+        messages = [reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()]
+    assert [message.header.stamp.sec for message in messages] == [0, 1, 2]
+    for message in messages:
+        assert message.encoding == "mono8"
+        assert np.array_equal(message.data.reshape(message.height, message.width), edges)
 
 
 def test_scan_line_has_one_strong_candidate(tmp_path, capsys):

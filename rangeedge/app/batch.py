@@ -3,40 +3,26 @@
 from __future__ import annotations
 
 import os
-import re
-import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from .. import __version__
 from .._check import boolean, described, error, fail, integer
 from .._option import parsed, takes
-from ..frames import outcomes_of
 from ..io import RangeImage, imreadRange
 from ..io.source import file_name
 from ..options import DETECTION, LINKING, Growing, Linking, ScanLineParams, Selection
 from ..recording import FrameSource, framesOf
-from ..recording.manifest import Line, Manifest, changed, complete
+from ..recording.manifest import Line, Manifest
 from ..recording.stores import FORMS, Outputs, packed, prepare_zarr, write_chunks, write_file
-from ..recording.workers import Outcome
-from .results import EdgeResults, edge_files, encoded, find_edges, plain, write_folder
+from .results import EdgeResults, edge_files, encoded, find_edges, write_folder
+from .run import BatchItem, Job, run_frames
 from .tasks import TASKS, Counts, picture_of
 
-MANIFEST = "manifest.jsonl"
-_STAGE = re.compile(r"\.[0-9a-f]{32}\.tmp")  # what a run that was killed may leave behind
-
-
-class BatchItem(NamedTuple):
-    """What became of one frame."""
-
-    path: str
-    folder: str
-    state: str  # "written", "skipped" or "failed"
-    message: str  # of the error, or empty
+_MANIFEST = "manifest.jsonl"
 
 
 @takes(DETECTION)
@@ -202,88 +188,42 @@ def runBatch(
     parsed(options, ScanLineParams, Selection, Growing, Linking)
     frames = framesOf(inputs, topics=tuple(topics), calibration=calibration)
     options |= {} if mask is None else {"mask": mask}
-    told = options | ({} if calibration is None else {"calibration": calibration})
-    job = _Job(task, form, root, options, told)
-    path = root.with_name(f"{root.name}.{MANIFEST}") if form == "zarr" else root / MANIFEST
+    told = {} if calibration is None else {"calibration": calibration}
+    job = _FrameJob(root, options, told, task, form)
+    path = root.with_name(f"{root.name}.{_MANIFEST}") if form == "zarr" else root / _MANIFEST
     if resume and not path.exists():
         raise error(f"there is no {str(path)!r} to resume from")
-    return _items(job, frames, Manifest(path), force, jobs=jobs, client=client, batch=batch)
-
-
-def _items(
-    job: _Job, frames: list[FrameSource], manifest: Manifest, force: bool, **workers: Any
-) -> Iterator[BatchItem]:
-    with manifest.opened():
-        _sweep(job.out)
-        done = set() if force else {f.name for i, f in enumerate(frames) if job.is_done(i, f, manifest.lines)}
-        manifest.keep(done)
-        if job.form == "zarr":
-            prepare_zarr(job.out, TASKS[job.task].frames, frames, job.options, fresh=not done)
-        pending = [(index, frame) for index, frame in enumerate(frames) if frame.name not in done]
-        modified = {frame.path: changed(frame.path) for _, frame in pending}
-        outcomes = outcomes_of(job, pending, **workers)
-        for index, frame in enumerate(frames):
-            where = str(job.place(frame))
-            if frame.name in done:
-                yield BatchItem(frame.title, where, "skipped", "")
-                continue
-            outcome = next(outcomes)
-            line = job.line(index, frame, outcome, modified[frame.path])
-            manifest.append(line)
-            yield BatchItem(frame.title, where, line["state"], outcome.error)
-            if outcome.full:
-                raise error(f"nothing more can be written to {str(job.out)!r}; make room, and run it again")
-
-
-def _sweep(out: Path) -> None:
-    """Remove what a killed run has left unfinished."""
-    for folder, folders, files in os.walk(out):
-        for name in filter(_STAGE.fullmatch, folders):
-            shutil.rmtree(Path(folder, name), ignore_errors=True)
-        for name in filter(_STAGE.fullmatch, files):
-            Path(folder, name).unlink(missing_ok=True)
-        folders[:] = [name for name in folders if not _STAGE.fullmatch(name)]
+    return run_frames(job, frames, Manifest(path), force, jobs=jobs, client=client, batch=batch)
 
 
 @dataclass(frozen=True)
-class _Job:
-    """What is done with each frame; called in the process that does it."""
+class _FrameJob(Job):
+    """Frames each on its own."""
 
     task: str
     form: str
-    out: Path
-    options: dict[str, Any]
-    told: dict[str, Any]
+
+    def prepare(self, frames: list[FrameSource], fresh: bool) -> None:
+        if self.form == "zarr":
+            prepare_zarr(self.out, TASKS[self.task].frames, frames, self.options, fresh)
 
     def place(self, frame: FrameSource) -> Path:
-        """Where its results are."""
         if self.form == "zarr":
             return self.out
         return self.out / (frame.name if self.form == "folder" else f"{frame.name}.{self.form}")
 
     def parameters(self, frame: FrameSource) -> dict[str, Any]:
-        known = RangeImage(np.empty(0), dict(frame.geometry)).withGeometry(**self.told).geometry
-        return {"task": self.task, "form": self.form, **plain(known)}
+        return {"task": self.task, "form": self.form, **super().parameters(frame)}
 
     def is_done(self, index: int, frame: FrameSource, lines: Mapping[str, Line]) -> bool:
-        """Whether its line in the manifest still holds."""
-        line = lines.get(frame.name)
-        return (
-            line is not None
-            and line.get("state") == "written"
-            and line.get("rangeedge") == __version__
-            and (line.get("input"), line.get("part")) == (frame.path, frame.part)
-            and line.get("modified") == changed(frame.path)
-            and line.get("parameters") == self.parameters(frame)
-            and (self.form != "zarr" or line.get("index") == index)
-            and complete(self.out, line)
-        )
+        here = self.form != "zarr" or lines.get(frame.name, {}).get("index") == index
+        return here and super().is_done(index, frame, lines)
 
     def __call__(self, task: tuple[int, FrameSource]) -> tuple[Outputs, Counts]:
         index, frame = task
         image, own = frame.read(**self.options), TASKS[self.task]
         if self.form == "folder":
-            files, counts = own.files(image, frame.title, self.told)
+            files, counts = own.files(image, frame.title, self.options)
             write_folder(self.out / frame.name, files)
             return {f"{frame.name}/{name}": len(data) for name, data in files.items()}, counts
         arrays, counts = own.arrays(image)
@@ -291,24 +231,6 @@ class _Job:
             return write_chunks(self.out, index, arrays), counts
         data = packed(arrays) if self.form == "npz" else encoded(".png", picture_of(arrays, own.picture))
         return write_file(self.out, f"{frame.name}.{self.form}", data), counts
-
-    def line(self, index: int, frame: FrameSource, outcome: Outcome, modified: int | None) -> Line:
-        """What the manifest says of a frame."""
-        outputs, counts = outcome.value or ({}, {})
-        line = {
-            "frame": frame.name,
-            "input": frame.path,
-            "part": frame.part,
-            "index": index,
-            "state": "failed" if outcome.error else "written",
-            "outputs": outputs,
-            "counts": counts,
-            "seconds": round(outcome.seconds, 4),
-            "parameters": self.parameters(frame),
-            "modified": modified,
-            "rangeedge": __version__,
-        }
-        return line | {"error": outcome.error} if outcome.error else line
 
 
 def detect_file(path: str, folder: Path, options: dict[str, Any]) -> EdgeResults:

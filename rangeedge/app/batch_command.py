@@ -7,20 +7,23 @@ import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
+from .._check import error
 from ..recording import framesOf
 from ..recording.stores import FORMS
-from .batch import BatchItem, runBatch
+from .batch import runBatch
+from .blocks import runBlocks
+from .run import BatchItem
 from .tasks import TASKS
 
-BATCH_ARGUMENTS = {"inputs", "task", "form", "jobs", "dask", "perTask", "resume", "force", "topics"}
+BATCH_ARGUMENTS = {
+    *("inputs", "task", "form", "jobs", "dask", "perTask", "resume", "force", "topics", "blocks", "overlap"),
+}
 
 _INPUTS = """Any number of: range images as for `detect`; folders of such; patterns ("frames/*.png");
 NPY, NPZ or Zarr of shape (N, H, W); TIFF of many pages; sequences of the TUM RGB-D benchmark (folders with depth.txt);
 with the extra [bags] ROS bags and MCAP files with depth images or organized clouds."""
-
-_T = TypeVar("_T")
 
 
 def add_batch_arguments(parser: argparse.ArgumentParser) -> None:
@@ -42,6 +45,14 @@ def add_batch_arguments(parser: argparse.ArgumentParser) -> None:
         help="what is written a frame: a folder as by the command; the arrays as npz; edges or labels as png; chunks of"
         " a Zarr store (default: folder, or zarr where STORE is one)",
     )
+    own.add_argument(
+        "--blocks",
+        type=int,
+        default=None,
+        metavar="N",
+        help="do one INPUT, larger than memory (TIFF; NPY or Zarr of shape (H, W)), in blocks of N pixels into a STORE",
+    )
+    own.add_argument("--overlap", type=int, default=256, metavar="N", help="pixels around a block (default: 256)")
     own.add_argument("--topic", action="append", default=[], dest="topics", help="of a bag (default: all with depths)")
     own.add_argument("--jobs", type=int, default=1, metavar="N", help="frames worked on at a time (default: 1)")
     own.add_argument(
@@ -71,29 +82,26 @@ def run_batch(args: argparse.Namespace, options: dict[str, Any]) -> int:
 
 
 def _run(args: argparse.Namespace, options: dict[str, Any], client: Any) -> int:
-    frames = framesOf(args.inputs, topics=args.topics, calibration=options.get("calibration"))
-    items = runBatch(
-        frames,
-        args.out,
-        args.task,
-        form=args.form,
-        jobs=args.jobs,
-        client=client,
-        batch=args.perTask,
-        force=args.force,
-        resume=args.resume,
-        **options,
-    )
+    told = {"jobs": args.jobs, "client": client, "force": args.force, "resume": args.resume, **options}
+    if args.blocks is not None:
+        if len(args.inputs) != 1:
+            raise error(f"--blocks does one INPUT, not {len(args.inputs)}")
+        size = {"blockSize": args.blocks, "overlap": args.overlap}
+        items, total = runBlocks(args.inputs[0], args.out, args.task, **size, **told), None
+    else:
+        frames = framesOf(args.inputs, topics=args.topics, calibration=options.get("calibration"))
+        items, total = runBatch(frames, args.out, args.task, form=args.form, batch=args.perTask, **told), len(frames)
     counts: Counter[str] = Counter()
     failed: list[BatchItem] = []
     try:
-        for item in _with_progress(items, len(frames)):
+        for item in _with_progress(items, total):
             counts[item.state] += 1
             if item.state == "failed":
                 failed.append(item)
     except BaseException as reason:
         if isinstance(reason, (KeyboardInterrupt, ValueError)):
-            print(f"stopped: {_summary(counts)} of {len(frames)} frames; run the same again to go on", file=sys.stderr)
+            whole = "" if total is None else f" of {total} frames"
+            print(f"stopped: {_summary(counts)}{whole}; run the same again to go on", file=sys.stderr)
         raise
     print(_summary(counts))
     for item in failed:
@@ -105,7 +113,7 @@ def _summary(counts: Counter[str]) -> str:
     return ", ".join(f"{counts[state]} {state}" for state in ("written", "skipped", "failed"))
 
 
-def _with_progress(items: Iterable[BatchItem], total: int) -> Iterator[BatchItem]:
+def _with_progress(items: Iterable[BatchItem], total: int | None) -> Iterator[BatchItem]:
     """A bar with rate and remaining time where a person looks on; else a line a frame."""
     if sys.stderr.isatty():
         try:

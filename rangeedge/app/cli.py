@@ -17,7 +17,10 @@ import numpy as np
 from .. import __version__
 from .._check import error, named
 from .._option import Option
+from ..draw import drawEdges
+from ..io import RangeImage
 from ..io.atomic import write_atomically
+from ..io.lines import is_line_file, writeLines
 from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing, Linking
 from .batch import detect_file, read_image
 from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
@@ -29,6 +32,7 @@ from .results import (
     encoded,
     find_edges,
     find_regions,
+    outlines_of,
     region_files,
     write_folder,
 )
@@ -45,10 +49,12 @@ _EPILOGUES = {
   rangeedge detect cloud.pcd --crease-threshold 20 --out edges""",
     "segment": """examples:
   rangeedge segment depth.png -K 525,525,319.5,239.5 --out regions
-  rangeedge segment cloud.pcd --min-area 300 --out regions""",
+  rangeedge segment cloud.pcd --min-area 300 --out regions
+  rangeedge segment roofs.tiff --out roofs.geojson     # or .csv, .ply, .obj, .dxf, .svg: the outlines alone""",
     "lines": """examples:
   rangeedge lines depth.png -K 525,525,319.5,239.5 --out lines
-  rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines""",
+  rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines
+  rangeedge lines terrain.tiff --out ridges.geojson    # or .csv, .ply, .obj, .dxf, .svg: the chains alone""",
     "explain": """examples:
   rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233
   rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233 --crease-threshold 20 --out why.png
@@ -118,14 +124,14 @@ def _parser() -> argparse.ArgumentParser:
 
     segment = _command(commands, "segment", _segment, "divide one range image into surfaces")
     segment.add_argument("image", metavar="IMAGE", help=_INPUT)
-    _add_out(segment)
+    _add_out(segment, "or the name of a file of outlines")
     _add_geometry(segment)
     _add_options(segment, "how regions grow", Growing.options)
     _add_detector(segment)
 
     lines = _command(commands, "lines", _lines, "find the edges of one range image as lines in space")
     lines.add_argument("image", metavar="IMAGE", help=_INPUT)
-    _add_out(lines)
+    _add_out(lines, "or the name of a file of lines")
     _add_geometry(lines)
     _add_options(lines, "how lines are linked", Linking.options)
     _add_detector(lines)
@@ -309,10 +315,15 @@ def _segment(args: argparse.Namespace) -> int:
     options = _options(args)
     image = read_image(args.image, options)
     found = find_regions(image.src, **image.geometry)
-    write_folder(args.out, region_files(found, args.image, options))
+    alone = is_line_file(args.out)
+    if alone:
+        _write_lines(args.out, outlines_of(found), image)
+    else:
+        write_folder(args.out, region_files(found, args.image, options, image.georeference))
     _say_found(args.image, found.edges)
     print(f"{len(found.surfaces) - 1} regions from {found.seeds.max()} seeds")
-    _say_written(args.out, REGION_FILES)
+    if not alone:
+        _say_written(args.out, REGION_FILES)
     return 0
 
 
@@ -322,10 +333,26 @@ def _lines(args: argparse.Namespace) -> int:
     options = _options(args)
     image = read_image(args.image, options)
     chains, found = find_lines(image)
-    write_folder(args.out, line_files(image, chains, found, args.image, options))
+    alone = is_line_file(args.out)
+    if alone:
+        _write_lines(args.out, chains, image)
+    else:
+        write_folder(args.out, line_files(image, chains, found, args.image, options))
     print(f"{args.image}: {len(chains)} chains, {len(found.segments)} segments, {len(found.vertices)} vertices")
-    _say_written(args.out, LINE_FILES)
+    if not alone:
+        _say_written(args.out, LINE_FILES)
     return 0
+
+
+def _write_lines(path: Path, lines: Any, image: RangeImage) -> None:
+    """Lines to a file of their own, on the map where the image is on one, over the image where that is a picture."""
+    suffix = path.suffix.lower()
+    more: dict[str, Any] = {"transform": image.georeference} if suffix == ".geojson" else {}
+    if suffix == ".svg":
+        nothing = np.zeros(image.src.shape[:2], np.uint8)
+        geometry = {name: value for name, value in image.geometry.items() if name in GEOMETRY}
+        more["picture"] = drawEdges(image.src, nothing, **geometry)
+    writeLines(path, lines, **more)
 
 
 @named("explain")

@@ -1,5 +1,6 @@
 """Pictures of range images, edges, regions and distances: BGR, as ``cv2.imwrite`` and ``cv2.imshow`` expect them."""
 
+from .boundaries import drawBoundaries
 from .distance import colorizeDistance
 from .edges import drawEdges
 from .explanation import drawExplanation
@@ -9,6 +10,7 @@ from .regions import drawRegions
 
 __all__ = [
     "colorizeDistance",
+    "drawBoundaries",
     "drawChains",
     "drawEdges",
     "drawExplanation",

@@ -71,7 +71,7 @@ def drawChains(
     """
     if not isinstance(chains, Sequence) or not all(isinstance(chain, EdgeChain) for chain in chains):
         raise fail("chains", "EdgeChains, or a sequence of EdgeChain", described(chains))
-    canvas, scale = _canvas(src, scale, geometry)
+    canvas, scale = canvas_of(src, scale, geometry)
     for chain in chains:
         places = np.column_stack([chain.points["x"], chain.points["y"]])
         places = places[np.isfinite(places).all(axis=1)]
@@ -128,9 +128,10 @@ def drawSegments(
     (48, 64, 3)
     """
     for name, value, dtype in (("segments", segments, SEGMENT), ("vertices", vertices, VERTEX)):
-        if value is not None and (not isinstance(value, np.ndarray) or value.dtype != dtype):
+        missing = value is None and name == "vertices"
+        if not missing and (not isinstance(value, np.ndarray) or value.dtype != dtype):
             raise fail(name, "a structured array from fitSegments", described(value))
-    canvas, scale = _canvas(src, scale, geometry)
+    canvas, scale = canvas_of(src, scale, geometry)
     for segment in segments:
         _line(canvas, segment["pixels"], int(segment["kind"]), scale)
     for vertex in vertices if vertices is not None else ():
@@ -140,7 +141,7 @@ def drawSegments(
     return deliver("dst", canvas, dst)
 
 
-def _canvas(src: np.ndarray, scale: int, geometry: GeometryOptions) -> tuple[np.ndarray, int]:
+def canvas_of(src: np.ndarray, scale: int, geometry: GeometryOptions) -> tuple[np.ndarray, int]:
     scale = integer("scale", scale, 1, 16)
     canvas = backdrop(src, geometry)
     if scale > 1:
@@ -148,23 +149,23 @@ def _canvas(src: np.ndarray, scale: int, geometry: GeometryOptions) -> tuple[np.
     return canvas, scale
 
 
-def _fixed(places: np.ndarray, scale: int) -> np.ndarray:
+def fixed(places: np.ndarray, scale: int) -> np.ndarray:
     """Places as integers of OpenCV, pixel centres being whole numbers in the image as in the picture."""
     return np.rint(((places + 0.5) * scale - 0.5) * (1 << _SHIFT)).astype(np.int32)
 
 
 def _line(canvas: np.ndarray, places: np.ndarray, kind: int, scale: int, *, closed: bool = False) -> None:
     width = max(1, (scale + 1) // 2)
-    cv2.polylines(canvas, [_fixed(places, scale)], closed, kind_colour(kind), width, cv2.LINE_AA, _SHIFT)
+    cv2.polylines(canvas, [fixed(places, scale)], closed, kind_colour(kind), width, cv2.LINE_AA, _SHIFT)
 
 
 def _dot(canvas: np.ndarray, place: np.ndarray, colour: tuple[int, int, int], scale: int) -> None:
-    x, y = _fixed(place, scale).tolist()
+    x, y = fixed(place, scale).tolist()
     cv2.circle(canvas, (x, y), (scale + 1) << _SHIFT, colour, cv2.FILLED, cv2.LINE_AA, _SHIFT)
 
 
 def _label(canvas: np.ndarray, place: np.ndarray, text: str, scale: int) -> None:
-    x, y = (_fixed(place, scale) >> _SHIFT).tolist()
+    x, y = (fixed(place, scale) >> _SHIFT).tolist()
     size = 0.3 + 0.06 * scale
     for colour, width in ((_HALO, 3), (_INK, 1)):
         cv2.putText(canvas, text, (x + 4, y - 4), cv2.FONT_HERSHEY_SIMPLEX, size, colour, width, cv2.LINE_AA)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from .._typed import GeometryOptions
 
-_REGIONS = np.array(  # Tol's muted scheme
+REGION_COLOURS = np.array(  # Tol's muted scheme
     [
         (238, 204, 136), (119, 102, 204), (119, 204, 221), (51, 119, 17), (136, 34, 51),
         (153, 68, 170), (153, 170, 68), (51, 153, 153), (85, 34, 136),
@@ -71,7 +71,7 @@ def drawRegions(
            [119, 102, 204],
            [238, 204, 136]], dtype=uint8)
     """
-    labels = _check.labels32s("labels", labels)
+    labels = _check.labels32s("labels", labels, listed=True)
     alpha = _check.number("alpha", alpha, 0, 1)
     if src is None:
         canvas, alpha = np.zeros((*labels.shape, 3), np.uint8), 1.0
@@ -88,8 +88,8 @@ def _region_colours(labels: np.ndarray, inside: np.ndarray) -> np.ndarray:
     """Colour of every pixel inside a region."""
     names, region = np.unique(labels[inside], return_inverse=True)
     region = region.reshape(-1)
-    choice = _shared_out(names, _neighbours(region[nearest(inside)]))
-    return _REGIONS[choice[region]]
+    choice = shared_out(names, _neighbours(region[nearest(inside)]))
+    return REGION_COLOURS[choice[region]]
 
 
 def _neighbours(region: np.ndarray) -> dict[int, set[int]]:
@@ -109,11 +109,11 @@ def _neighbours(region: np.ndarray) -> dict[int, set[int]]:
     return neighbours
 
 
-def _shared_out(names: np.ndarray, neighbours: dict[int, set[int]]) -> np.ndarray:
+def shared_out(names: np.ndarray, neighbours: dict[int, set[int]]) -> np.ndarray:
     """Colour number of each region: its own by label, or else the next that no coloured neighbour has."""
     choice = np.empty(len(names), np.intp)
     for i, name in enumerate(names.tolist()):
         taken = {choice[j] for j in neighbours[i] if j < i}
-        own = [(name - 1 + k) % len(_REGIONS) for k in range(len(_REGIONS))]
+        own = [(name - 1 + k) % len(REGION_COLOURS) for k in range(len(REGION_COLOURS))]
         choice[i] = next((c for c in own if c not in taken), own[0])
     return choice

@@ -24,6 +24,7 @@ _UNCOMPRESSED = 1
 _RGB = 2
 _COLOURS = {_RGB: "RGB", 3: "a palette", 5: "CMYK", 6: "YCbCr", 8: "CIELab"}
 Shape = tuple[int, int, int]  # rows, columns, samples
+Window = tuple[int, int, int, int]  # first row and column, and those behind the last
 
 _KINDS = {1: "u", 2: "i", 3: "f", 4: "u"}  # by sample format
 
@@ -50,10 +51,25 @@ def read_page(page: Page) -> RangeImage:
     return described_by(page, _pixels(page, page.data))
 
 
-def _pixels(page: Page, data: bytes) -> np.ndarray:
-    """The image as (rows, cols), or (rows, cols, samples) of points."""
+def read_window(page: Page, window: Window) -> RangeImage:
+    """A part of an image, which may be larger than those that are read as a whole."""
+    return described_by(page, _pixels(page, page.data, window))
+
+
+def size_of_page(page: Page) -> RangeImage:
+    """The geometry of an image, and zeros in its type: (rows, 1); of points it is refused."""
+    dtype, samples = _sample_type(page)
+    if samples != 1:
+        raise ValueError("it holds points, not one channel of depths or heights")
+    return described_by(page, np.zeros((page.value(tag.LENGTH), 1), dtype.newbyteorder("=")))
+
+
+def _pixels(page: Page, data: bytes, window: Window | None = None) -> np.ndarray:
+    """The image, or a part of it, as (rows, cols), or (rows, cols, samples) of points."""
     rows, cols = page.value(tag.LENGTH), page.value(tag.WIDTH)
-    expect_pixels(rows, cols)
+    window = window or (0, 0, rows, cols)
+    shape = (window[2] - window[0], window[3] - window[1])
+    expect_pixels(*shape)
     _expect_no_colours(page)
     dtype, samples = _sample_type(page)
     size = rows * cols * samples * dtype.itemsize
@@ -65,10 +81,10 @@ def _pixels(page: Page, data: bytes) -> np.ndarray:
     separate = page.value(tag.PLANAR_CONFIGURATION, 1) == 2 and samples > 1
     if compression not in _DECODERS:
         raise ValueError(f"it is compressed by {_OTHERS.get(compression, f'method {compression}')}; use deflate or LZW")
-    image = _from_segments(page, rows, cols, samples, separate, dtype)
+    image = _from_segments(page, rows, cols, samples, separate, dtype, window)
     if page.value(tag.PHOTOMETRIC, 1) == _RGB and not (image < 0).any():
         raise _colours("RGB")  # half of all points have a coordinate below zero
-    return image.reshape((rows, cols) if samples == 1 else (rows, cols, samples))
+    return image.reshape(shape if samples == 1 else (*shape, samples))
 
 
 def _colours(photometric: str) -> ValueError:
@@ -107,8 +123,10 @@ def _sample_type(page: Page) -> tuple[np.dtype, int]:
     return np.dtype(f"{page.order}{_KINDS[kind]}{width // 8}"), samples
 
 
-def _from_segments(page: Page, rows: int, cols: int, samples: int, separate: bool, dtype: np.dtype) -> np.ndarray:
-    """An image of shape (rows, cols, samples) from its strips or tiles."""
+def _from_segments(
+    page: Page, rows: int, cols: int, samples: int, separate: bool, dtype: np.dtype, window: Window
+) -> np.ndarray:
+    """A part of an image of shape (rows, cols, samples) from the strips or tiles that have a share in it."""
     if page.value(tag.FILL_ORDER, 1) != 1:
         raise ValueError("the bits of its bytes are in reverse order")
     planes, depth = (samples, 1) if separate else (1, samples)
@@ -127,10 +145,13 @@ def _from_segments(page: Page, rows: int, cols: int, samples: int, separate: boo
 
     decode = _DECODERS[page.value(tag.COMPRESSION, _UNCOMPRESSED)]
     predictor = page.value(tag.PREDICTOR, 1) if decode is not _stored else 1
-    image = np.empty((rows, cols, samples), dtype.newbyteorder("="))
+    above, before, below, behind = window
+    image = np.empty((below - above, behind - before, samples), dtype.newbyteorder("="))
     for index, (offset, count) in enumerate(zip(offsets.tolist(), counts.tolist(), strict=True)):
         plane, place = divmod(index, down * right)
         top, left = place // right * height, place % right * width
+        if top >= below or top + height <= above or left >= behind or left + width <= before:
+            continue
         segment_rows = height if tiled else min(height, rows - top)
         expect_at_least(len(page.data), offset + count)
         packed = np.frombuffer(page.data, np.uint8, count, offset)
@@ -139,8 +160,9 @@ def _from_segments(page: Page, rows: int, cols: int, samples: int, separate: boo
         if len(plain) < _size(shape, dtype):
             raise ValueError(f"a strip or tile unpacks to {len(plain)} bytes where {_size(shape, dtype)} are needed")
         segment = _unpredicted(plain, shape, dtype, predictor)
-        target = image[top : top + segment_rows, left : left + width, plane : plane + depth]
-        target[...] = segment[: target.shape[0], : target.shape[1]]
+        y, x = max(top, above), max(left, before)
+        own = segment[y - top : below - top, x - left : behind - left]
+        image[y - above : y - above + len(own), x - before : x - before + own.shape[1], plane : plane + depth] = own
     return image
 
 

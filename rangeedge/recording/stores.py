@@ -18,9 +18,11 @@ import numpy as np
 
 from .._check import error, public
 from ..io.atomic import write_atomically
+from ..io.tiff import Window
 from .source import FrameSource, extra
 
 Outputs = dict[str, int]
+Shape = tuple[int, ...]
 FORMS = ("folder", "npz", "png", "zarr")
 
 
@@ -52,51 +54,72 @@ def prepare_zarr(
     root: Path, kinds: Mapping[str, str], frames: Iterable[FrameSource], given: Mapping[str, Any], fresh: bool
 ) -> None:
     """Make room in a store for frames of the size that the first readable one has: an array (N, H, W) a result."""
-    zarr = extra("zarr", "zarr", "a Zarr store")
     frames = list(frames)
-    try:
-        group = zarr.open_group(str(root), mode="a")
-        have = {name: group[name] for name in kinds if name in group}
-        if not fresh and have.keys() == kinds.keys():
-            for array in have.values():
-                array.resize((len(frames), *array.shape[1:]))
-            return
-        size = _size(frames, given)
-        if size is None:
-            return
-        for name, kind in kinds.items():
-            group.create_array(
-                name, shape=(len(frames), *size), chunks=(1, *size), dtype=np.dtype(kind), fill_value=0, overwrite=True
-            )
-        group.attrs["frames"] = [frame.name for frame in frames]
-    except OSError as reason:
-        raise error(f"cannot write to {str(root)!r}: {reason.strerror or reason}", cv2.Error.StsError) from reason
+    size = None if fresh else _size_of_store(root, kinds)
+    size = size or _size(frames, given)
+    if size is not None:
+        shape, chunk = (len(frames), *size), (1, *size)
+        prepare_arrays(root, {name: (kind, shape, chunk) for name, kind in kinds.items()}, fresh)
+
+
+def _size_of_store(root: Path, kinds: Iterable[str]) -> tuple[int, int] | None:
+    arrays = open_arrays(root, "a")
+    sizes = {arrays[name].shape[1:] for name in kinds if name in arrays}
+    return sizes.pop() if len(sizes) == 1 else None
 
 
 def _size(frames: Iterable[FrameSource], given: Mapping[str, Any]) -> tuple[int, int] | None:
     for frame in frames:
         try:
-            return frame.read(**given).src.shape[:2]
+            rows, cols = frame.read(**given).src.shape[:2]
         except Exception:  # its own turn says what is wrong with it
             continue
+        return rows, cols
     return None
+
+
+def open_arrays(root: Path, mode: str = "r+") -> Any:
+    """The arrays of a store by their names."""
+    return extra("zarr", "zarr", "a Zarr store").open_group(str(root), mode=mode)
+
+
+def prepare_arrays(root: Path, arrays: Mapping[str, tuple[str, Shape, Shape]], fresh: bool) -> None:
+    """Make room in a store, for arrays of a type, a shape and chunks; what is there stays where it is not `fresh`."""
+    try:
+        group = open_arrays(root, "a")
+        for name, (kind, shape, chunks) in arrays.items():
+            if fresh or name not in group:
+                group.create_array(name, shape=shape, chunks=chunks, dtype=kind, fill_value=0, overwrite=True)
+            else:
+                group[name].resize(shape)
+    except OSError as reason:
+        raise error(f"cannot write to {str(root)!r}: {reason.strerror or reason}", cv2.Error.StsError) from reason
 
 
 def write_chunks(root: Path, index: int, arrays: Mapping[str, np.ndarray]) -> Outputs:
     """The results of one frame, each a chunk."""
-    zarr = extra("zarr", "zarr", "a Zarr store")
+    group = open_arrays(root)
+    for name, values in arrays.items():
+        rows, cols = group[name].shape[1:]
+        if values.shape != (rows, cols):
+            raise error(
+                f"it has {values.shape[1]} x {values.shape[0]} pixels, the store has frames of {cols} x {rows}; "
+                "write frames of several sizes into a folder"
+            )
+    return _written(root, group, arrays, (index,), (index, 0, 0))
+
+
+def write_region(root: Path, arrays: Mapping[str, np.ndarray], window: Window, place: tuple[int, int]) -> Outputs:
+    """The results of one block, each the chunk at a row and column."""
+    top, left, bottom, right = window
+    return _written(root, open_arrays(root), arrays, (slice(top, bottom), slice(left, right)), place)
+
+
+def _written(root: Path, group: Any, arrays: Mapping[str, np.ndarray], where: Any, place: Shape) -> Outputs:
     outputs = {}
-    with zarr.config.set({"array.write_empty_chunks": True}):  # what is there has been done
-        group = zarr.open_group(str(root), mode="r+")
+    with extra("zarr", "zarr", "a Zarr store").config.set({"array.write_empty_chunks": True}):
         for name, values in arrays.items():
-            array = group[name]
-            if values.shape != array.shape[1:]:
-                rows, cols = array.shape[1:]
-                raise error(
-                    f"it has {values.shape[1]} x {values.shape[0]} pixels, the store has frames of {cols} x {rows}; "
-                    "write frames of several sizes into a folder"
-                )
-            array[index] = values
-            chunk = f"{name}/{array.metadata.encode_chunk_key((index, 0, 0))}"
+            group[name][where] = values
+            chunk = f"{name}/{group[name].metadata.encode_chunk_key(place)}"
             outputs[chunk] = (root / chunk).stat().st_size
     return outputs

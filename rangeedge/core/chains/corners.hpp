@@ -2,8 +2,8 @@
 // circle does, by the ratio of their sums of squared residuals, of which neighbours that are alike count less.
 //
 // Places where chords of several lengths turn most are looked at first; then of all corners found the least is taken
-// back, again and again, while the lines between its neighbours do not confirm it; and last longer stretches are searched
-// for those that turn so little that no chord tells of them.
+// back, again and again, while the lines between its neighbours do not confirm it; and last longer stretches are
+// searched for those that turn so little that no chord tells of them.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <vector>

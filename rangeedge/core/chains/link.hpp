@@ -1,5 +1,5 @@
-// Edges as geometry: candidates joined along the map of thin lines into ordered chains of points, each with its place in
-// the image and on the image plane, and what either surface is like there.
+// Edges as geometry: candidates joined along the map of thin lines into ordered chains of points, each with its place
+// in the image and on the image plane, and what either surface is like there.
 //
 //   trace    the lines of the map become paths without branches (trace.hpp)
 //   divide   paths end where the kind of edge changes (pieces.hpp)
@@ -22,6 +22,7 @@ struct LinkOptions {
     double bridge;        // pixels: the widest gap that is bridged
     double corner_angle;  // degrees: a chain ends where it turns by more
     int min_length;       // pixels
+    bool outlines;        // whether to link boundaries with pixels without data, too
 };
 
 // All numbers as double, so that points are rows of one array.
@@ -36,7 +37,7 @@ struct ChainPoint {
 
 struct ChainHeader {
     std::int32_t first, count;  // of its points
-    std::int32_t kind;          // jump_bit, convex_bit or concave_bit
+    std::int32_t kind;          // jump_bit, convex_bit, concave_bit or boundary_bit
     std::int32_t closed, straight;
 };
 

@@ -12,6 +12,7 @@ void bind_chains(nanobind::module_& m);
 void bind_distance(nanobind::module_& m);
 void bind_regions(nanobind::module_& m);
 void bind_cleaning(nanobind::module_& m);
+void bind_outlines(nanobind::module_& m);
 void bind_io(nanobind::module_& m);
 
 }  // namespace rangeedge::python
@@ -26,5 +27,6 @@ NB_MODULE(_core, m) {
     rangeedge::python::bind_distance(m);
     rangeedge::python::bind_regions(m);
     rangeedge::python::bind_cleaning(m);
+    rangeedge::python::bind_outlines(m);
     rangeedge::python::bind_io(m);
 }

@@ -46,9 +46,9 @@ int bound_grow_regions(const BoundMap& map, const Image<std::int32_t>& markers, 
     return grow_regions(map.map, markers.data(), options, threads, labels.data());
 }
 
-void bound_verified_regions(const BoundMap& map, const ClosureParameters& options, int threads,
-                            const OutImage<std::int32_t>& regions) {
-    verified_regions(map.map, options, threads, regions.data());
+void bound_close_contours(const BoundMap& map, const Image<std::int32_t>& regions, const ClosureParameters& options,
+                          int threads, const OutImage<std::uint8_t>& lines) {
+    close_contours(map.map, regions.data(), options, threads, lines.data());
 }
 
 template <class A>
@@ -88,12 +88,13 @@ void bind_regions(nb::module_& m) {
                  field("min_area", &R::min_area), field("new_seeds", &R::new_seeds));
     using C = ClosureParameters;
     bind_options(m, "ClosureOptions", field("correlation", &C::correlation), field("tolerance", &C::tolerance),
-                 field("share", &C::share), field("dilations", &C::dilations), field("min_area", &C::min_area));
+                 field("share", &C::share), field("max_gap", &C::max_gap), field("min_area", &C::min_area));
     m.def("extract_seeds", &bound_extract_seeds, array("distance"), optional_array("mask"), "wrap"_a, "min_distance"_a,
           "separation"_a, "threads"_a, array("markers"), Unlocked());
     m.def("grow_regions", &bound_grow_regions, "map"_a, array("markers"), "options"_a, "threads"_a, array("labels"),
           Unlocked());
-    m.def("verified_regions", &bound_verified_regions, "map"_a, "options"_a, "threads"_a, array("regions"), Unlocked());
+    m.def("close_contours", &bound_close_contours, "map"_a, array("regions"), "options"_a, "threads"_a, array("lines"),
+          Unlocked());
     m.def("label_statistics", &bound_label_statistics, array("labels"), "threads"_a, array("boxes"), array("centroids"),
           Unlocked());
     m.def("region_moments", &bound_region_moments, array("labels"), array("points"), array("ordinate"), "threads"_a,

@@ -2,43 +2,54 @@
 #include "regions/closure.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
-#include "image/components.hpp"
-#include "regions/roof.hpp"
+#include "regions/open_parts.hpp"
 
 namespace rangeedge {
 namespace {
 
+constexpr double correlation_max = 8;  // noise over a region, in units of that between neighbours
+constexpr int reach = 8;             // pixels from a border that tell how two surfaces meet there, and that it may move
+constexpr double least_sided = 0.7;  // share of them that lie on their side of where the surfaces meet
+constexpr double surely_beside = 2;  // pixels from a border
+
 class Closer {
 public:
-    Closer(const RangeMap& map, const ClosureParameters& parameters, Team& team)
-        : image_(map, lateral_deviation, team), parameters_(parameters), region_(size(), 0) {
+    Closer(const RangeMap& map, const std::int32_t* regions, const ClosureParameters& parameters, Team& team)
+        : image_(map, lateral_deviation, team), parameters_(parameters), parts_(image_, regions) {
         image_.set_correlation(parameters.correlation, 1);
     }
 
-    void verify();
-    void grow_back();
-    void write(std::int32_t* regions) const;
+    void close() {
+        tidy();
+        align();
+        tidy();
+    }
+
+    void draw(std::uint8_t* lines);
 
 private:
-    std::size_t size() const { return static_cast<std::size_t>(image_.size()); }
-    int& region(int p) { return region_[static_cast<std::size_t>(p)]; }
-    template <class F>
-    void for_pixels(F&& visit) const {
-        for (int row = 0; row < image_.rows(); ++row) {
-            Watch::checkpoint();
-            for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; ++p) visit(p);
-        }
-    }
+    struct Part {
+        Surface surface;
+        bool verified = false;
+    };
+
     bool lies_on(const Pixels& pixels, const Surface& surface) const;
-    bool is_surface(const Pixels& pixels) const;
-    bool erode(std::vector<std::uint8_t>& mask, bool square) const;
+    bool are_one(const Border& border) const;
+    void tidy();
+    void verify();
+    void align();
+    void align(const Border& border);
+    const Part& part(int number) const { return of_part_[static_cast<std::size_t>(number)]; }
 
     SurfaceImage image_;
     ClosureParameters parameters_;
-    std::vector<int> region_;  // of every pixel, 0: none
+    OpenParts parts_;
+    std::vector<Part> of_part_;
 };
 
 bool Closer::lies_on(const Pixels& pixels, const Surface& surface) const {
@@ -48,109 +59,101 @@ bool Closer::lies_on(const Pixels& pixels, const Surface& surface) const {
     return static_cast<double>(near) >= parameters_.share * static_cast<double>(pixels.size());
 }
 
-// A plane, or a quadratic that two planes do not beat.
-bool Closer::is_surface(const Pixels& pixels) const {
-    const SurfaceSums sums = image_.sums_of(pixels);
-    if (sums.count() < least_pixels) return false;
-    if (lies_on(pixels, sums.plane())) return true;
-    const Surface curved = sums.quadratic();
-    if (sums.count() < least_curved || !lies_on(pixels, curved)) return false;
-    Pixels first, second;
-    return !split_roof(image_, pixels, curved, first, second);
+void Closer::tidy() {
+    parts_.absorb_slivers(parameters_.min_area);
+    parts_.trim_spurs();
+    parts_.absorb_slivers(parameters_.min_area);
+    verify();
 }
 
-// By a square or a cross; what lies outside the image takes nothing away. Returns whether anything was.
-bool Closer::erode(std::vector<std::uint8_t>& mask, bool square) const {
-    const int s = image_.stride();
-    const auto set_margin = [&](std::uint8_t value) {
-        std::fill(mask.begin(), mask.begin() + s, value);
-        std::fill(mask.end() - s, mask.end(), value);
-        for (std::size_t p = 0; p < mask.size(); p += static_cast<std::size_t>(s))
-            mask[p] = mask[p + static_cast<std::size_t>(s) - 1] = value;
-    };
-    set_margin(1);
-    const std::vector<std::uint8_t> before = mask;
-    const std::uint8_t* const m = before.data();
-    Checkpoints checkpoints;
-    for (int row = 0; row < image_.rows(); ++row)
-        for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; ++p) {
-            checkpoints.pass();
-            int kept = m[p] & m[p - s] & m[p - 1] & m[p + 1] & m[p + s];
-            if (square) kept &= m[p - s - 1] & m[p - s + 1] & m[p + s - 1] & m[p + s + 1];
-            mask[static_cast<std::size_t>(p)] = static_cast<std::uint8_t>(kept);
-        }
-    const bool changed = mask != before;
-    set_margin(0);
-    return changed;
-}
-
-// Numbers the components that are surfaces, and erodes the others until their parts are.
+// What a pixel may lie off its surface follows from what most do.
 void Closer::verify() {
-    std::vector<std::uint8_t> pending(size(), 0);
-    for_pixels([&](int p) { pending[static_cast<std::size_t>(p)] = image_.open(p); });
-    Pixels pixels;
-    int count = 0;
-    for (int step = 0; step <= parameters_.dilations; ++step) {
-        const Components parts(pending.data(), image_.rows(), image_.cols());
-        std::fill(pending.begin(), pending.end(), std::uint8_t{0});
-        bool failed = false;
-        Checkpoints checkpoints(256);
-        for (int i = 0; i < parts.count(); ++i) {
-            checkpoints.pass();
-            if (parts.area(i) < parameters_.min_area) continue;
-            pixels.clear();
-            for (const auto [begin, end] : parts.runs(i))
-                for (int p = begin; p < end; ++p) pixels.push_back(p);
-            if (is_surface(pixels)) {
-                ++count;
-                for (const int p : pixels) region(p) = count;
-            } else {
-                failed = true;
-                for (const int p : pixels) pending[static_cast<std::size_t>(p)] = 1;
-            }
+    of_part_.assign(static_cast<std::size_t>(parts_.count()) + 1, {});
+    std::vector<std::pair<double, std::size_t>> misfits;
+    std::size_t total = 0;
+    for (int i = 1; i <= parts_.count(); ++i) {
+        const SurfaceSums sums = image_.sums_of(parts_.pixels(i));
+        Surface& surface = of_part_[static_cast<std::size_t>(i)].surface;
+        surface = image_.surface_of(sums);
+        if (sums.count() < least_curved) continue;
+        misfits.emplace_back(surface.rms, parts_.pixels(i).size());
+        total += misfits.back().second;
+    }
+    std::sort(misfits.begin(), misfits.end());
+    std::size_t sum = 0;
+    for (const auto& [rms, count] : misfits)
+        if (sum += count; 2 * sum >= total) {
+            image_.set_correlation(std::clamp(rms, parameters_.correlation, correlation_max), 1);
+            break;
         }
-        if (!failed || !erode(pending, step % 2)) return;  // cross and square in turn: an octagon
+    for (int i = 1; i <= parts_.count(); ++i) {
+        const Pixels& pixels = parts_.pixels(i);
+        Part& p = of_part_[static_cast<std::size_t>(i)];
+        p.verified = static_cast<int>(pixels.size()) >= parameters_.min_area && lies_on(pixels, p.surface);
     }
 }
 
-// A pixel at a time; where regions meet, the one of higher number comes first.
-void Closer::grow_back() {
-    Pixels front, next;
-    Checkpoints checkpoints;
-    const auto reach = [&](int from, int label) {
-        for (const int step : image_.neighbours()) {
-            int& other = region(from + step);
-            if (other > 0 || !image_.open(from + step)) continue;
-            if (!other) next.push_back(from + step);
-            other = std::min(other, -label);  // negative: of this round
-        }
+void Closer::align() {
+    for (const Border& border : parts_.borders())
+        if (part(border.first).verified && part(border.second).verified) align(border);
+}
+
+// Where one surface passes through the other, it is above on one side of the border and below on the other.
+void Closer::align(const Border& border) {
+    const Surface &a = part(border.first).surface, &b = part(border.second).surface;
+    const auto above = [&](int p) {
+        const Sample s = image_.sample(p);
+        return a.value(s.x, s.y) > b.value(s.x, s.y);
     };
-    for_pixels([&](int p) {
-        if (region(p) > 0) reach(p, region(p));
-    });
-    while (!next.empty()) {
-        front.swap(next);
-        next.clear();
-        for (const int p : front) region(p) = -region(p);
-        for (const int p : front) {
-            checkpoints.pass();
-            reach(p, region(p));
-        }
+    const std::vector<std::pair<int, int>> near = parts_.near(border, reach);  // pixels and distances
+    int sure[2] = {0, 0}, over[2] = {0, 0};
+    for (const auto& [p, distance] : near) {
+        if (distance <= surely_beside) continue;
+        const int side = parts_.at(p) == border.second;
+        ++sure[side], over[side] += above(p);
     }
+    const auto share = [&](int side) { return sure[side] ? static_cast<double>(over[side]) / sure[side] : 0.5; };
+    const bool first_above = share(0) > share(1);
+    const double own[2] = {first_above ? share(0) : 1 - share(0), first_above ? 1 - share(1) : share(1)};
+    if (!(std::min(own[0], own[1]) >= least_sided)) return;
+    for (const auto& [p, distance] : near) parts_.set(p, above(p) == first_above ? border.first : border.second);
 }
 
-void Closer::write(std::int32_t* regions) const {
-    for_pixels([&](int p) { *regions++ = region_[static_cast<std::size_t>(p)]; });
+// Whether either surface is that of the other part, too.
+bool Closer::are_one(const Border& border) const {
+    return lies_on(parts_.pixels(border.second), part(border.first).surface) &&
+           lies_on(parts_.pixels(border.first), part(border.second).surface);
+}
+
+void Closer::draw(std::uint8_t* lines) {
+    const auto put = [&](int p) {
+        const int row = p / image_.stride() - 1, col = p % image_.stride() - 1;
+        lines[std::ptrdiff_t{row} * image_.cols() + col] = 255;
+    };
+    for (const Border& border : parts_.borders()) {
+        if (!part(border.first).verified || !part(border.second).verified || are_one(border)) continue;
+        for (const Pixels& line : parts_.lines(border)) {
+            int top = image_.rows(), bottom = 0, left = image_.cols(), right = 0;
+            for (const int p : line) {
+                const int row = p / image_.stride(), col = p % image_.stride();
+                top = std::min(top, row), bottom = std::max(bottom, row);
+                left = std::min(left, col), right = std::max(right, col);
+            }
+            if (std::max(bottom - top, right - left) >= parameters_.max_gap) continue;
+            for (const int p : line) put(p);
+        }
+    }
 }
 
 }  // namespace
 
-void verified_regions(const RangeMap& map, const ClosureParameters& parameters, int threads, std::int32_t* regions) {
+void close_contours(const RangeMap& map, const std::int32_t* regions, const ClosureParameters& parameters, int threads,
+                    std::uint8_t* lines) {
     Team team(threads);
-    Closer closer(map, parameters, team);
-    closer.verify();
-    closer.grow_back();
-    closer.write(regions);
+    Closer closer(map, regions, parameters, team);
+    closer.close();
+    std::fill_n(lines, std::ptrdiff_t{map.rows} * map.cols, std::uint8_t{0});
+    closer.draw(lines);
 }
 
 }  // namespace rangeedge

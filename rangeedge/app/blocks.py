@@ -1,0 +1,305 @@
+"""One image larger than memory, in blocks that overlap: edges, exact distances, and regions joined across seams."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .._check import boolean, described, error, fail, integer
+from .._option import parsed, takes
+from ..distance import distanceTransform
+from ..io import RangeImage
+from ..io.source import file_name
+from ..noise import estimateNoise
+from ..options import DETECTION, MEASURED, Growing, ScanLineParams, Selection
+from ..recording import FrameSource
+from ..recording.blocks import Grid, clearance, inside, joined, matches
+from ..recording.large import LargeImage, open_large, window_source
+from ..recording.manifest import Manifest, read_lines
+from ..recording.source import extra
+from ..recording.stores import Outputs, open_arrays, packed, prepare_arrays, write_file, write_region
+from ..regions import segmentRegions
+from .run import BatchItem, Job, run_frames
+from .tasks import TASKS, Counts
+
+_REACH = 4096  # pixels around a block in which the nearest edge is looked for
+_STRIP = 32  # pixels across a seam in which labels of both sides are compared
+_PATCHES = 16  # of the image, of which the noise is estimated
+_PATCH = 512  # pixels
+
+
+@takes({**DETECTION, **Growing.options})
+def runBlocks(
+    image: str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    task: str = "detect",
+    *,
+    blockSize: int = 2048,
+    overlap: int = 256,
+    jobs: int = 1,
+    client: Any = None,
+    force: bool = False,
+    resume: bool = False,
+    **options: Any,
+) -> Iterator[BatchItem]:
+    """Find the edges or regions of an image that is larger than memory.
+
+    runBlocks(image, out[, task], *[, blockSize[, overlap[, jobs[, client[, ...]]]]]) -> items
+
+    Every block is done with `overlap` pixels around it, of which nothing is kept; the noise is estimated once, of
+    patches spread over the image. The results are arrays of a Zarr store, in chunks of a block.
+
+    Parameters
+    ----------
+    image : path
+        A TIFF of any size, from which windows are read, with its pixel size and its value of no data; (H, W) NPY or
+        Zarr.
+    out : path
+        A Zarr store; a name that ends with ``.zarr``.
+    task : {"detect", "segment"}
+        ``detect`` writes edges, jump, crease, kind, significance, and the distance to the nearest edge; ``segment``
+        writes labels, and labels of each block by itself, parts.
+    blockSize, overlap : int
+        In pixels.
+    jobs, client, force, resume
+        As for `runBatch`: a block is what a frame is there, and the manifests are beside the store.
+    {options}
+
+    A noise given as a map is refused, and so is `mask`.
+
+    Returns
+    -------
+    items : iterator of BatchItem
+        One a block and pass: edges first, then distances; parts first, then labels.
+
+    Raises
+    ------
+    rangeedge.error
+        As from `runBatch`.
+
+    Notes
+    -----
+    Distances are those of the whole image wherever they are less than 4096 pixels; of a pixel farther from every edge
+    than that, the distance to the nearest one that was seen, or inf. Scan lines are divided from end to end, and so
+    edges may differ where a block ends them earlier; components of edges and regions are cut off beyond the overlap.
+    Labels of two blocks become one where they share half of the smaller, in the 32 pixels beyond the seam that both
+    blocks have labelled.
+
+    Examples
+    --------
+    >>> import os
+    >>> import tempfile
+    >>> from importlib.util import find_spec
+    >>> import numpy as np
+    >>> from rangeedge.batch import runBlocks
+    >>> path = os.path.join(tempfile.mkdtemp(), "terrain.npy")
+    >>> np.save(path, np.where(np.arange(300) < 150, 0.0, 5.0) * np.ones((200, 1)))
+    >>> if find_spec("zarr"):
+    ...     items = list(runBlocks(path, path + ".zarr", blockSize=128, overlap=32, noise=0.01, heightMap=True))
+    """
+    name, root = file_name(image, "image"), Path(file_name(out, "out"))
+    if task not in _PASSES:
+        raise fail("task", " or ".join(map(repr, _PASSES)), described(task))
+    if root.suffix != ".zarr":
+        raise fail("out", "a Zarr store, whose name ends with .zarr", repr(str(root)))
+    size, overlap, jobs = integer("blockSize", blockSize, 64), integer("overlap", overlap, 0), integer("jobs", jobs, 1)
+    force, resume = boolean("force", force), boolean("resume", resume)
+    for option in options.keys() - TASKS[task].options.keys():
+        raise error(f"`{option}` is no option of {task!r}")
+    parsed(options, ScanLineParams, Selection, Growing)
+    if isinstance(options.get("noise"), np.ndarray):
+        raise fail("noise", "a number or a NoiseModel with blocks", described(options["noise"]))
+    extra("zarr", "zarr", "an image in blocks")
+    large = open_large(name)
+    first = _manifest(root, _PASSES[task][0])
+    if resume and not first.exists():
+        raise error(f"there is no {str(first)!r} to resume from")
+    return _passes(task, large, Grid(large.shape, size), root, overlap, options, force, jobs=jobs, client=client)
+
+
+def _manifest(root: Path, step: str) -> Path:
+    return root.with_name(f"{root.name}.{step}.manifest.jsonl")
+
+
+def _passes(
+    task: str,
+    image: LargeImage,
+    grid: Grid,
+    root: Path,
+    overlap: int,
+    options: dict[str, Any],
+    force: bool,
+    **workers: Any,
+) -> Iterator[BatchItem]:
+    """The two steps of a task; the second anew where the first has written anything."""
+    options = {**options, "noise": _noise(image, options)}
+    told: dict[str, Any] = {"blockSize": grid.size, "overlap": overlap}
+    sources = list(_sources(image, grid, overlap))
+    for step in _PASSES[task]:
+        if step == "labels":
+            told |= _numbering(root, grid)
+        job, manifest = _STEPS[step](root, options, told, grid), Manifest(_manifest(root, step))
+        for item in run_frames(job, sources, manifest, force, **workers):
+            force |= item.state == "written"
+            yield item
+
+
+def _sources(image: LargeImage, grid: Grid, overlap: int) -> Iterator[FrameSource]:
+    digits = len(str(max(image.shape)))
+    for index in range(len(grid)):
+        top, left, bottom, right = grid.window(index)
+        name = f"{top:0{digits}d}_{left:0{digits}d}"
+        part = f"rows {top} to {bottom}, columns {left} to {right}"
+        yield window_source(image, name, grid.window(index, overlap), part)
+
+
+def _noise(image: LargeImage, options: dict[str, Any]) -> Any:
+    """The noise as given, or as patches tell that are spread over the image, with rows and columns of NaN between."""
+    if options.get("noise") is not None:
+        return options["noise"]
+    size = min(_PATCH, *image.shape)
+    side = int(np.sqrt(_PATCHES))
+    tops, lefts = (np.unique(np.linspace(0, extent - size, side).astype(int)).tolist() for extent in image.shape)
+    rows = []
+    for top in tops:
+        row = [window_source(image, "", (top, left, top + size, left + size), "").read().src for left in lefts]
+        rows.append(np.hstack([np.pad(patch, 1, constant_values=_nothing(patch)) for patch in row]))
+    known = {name: value for name, value in {**image.geometry, **options}.items() if name in MEASURED}
+    return estimateNoise(np.vstack(rows), **known)
+
+
+def _nothing(patch: np.ndarray) -> float:
+    """What stands for no data."""
+    return np.nan if patch.dtype.kind == "f" else np.iinfo(patch.dtype).min
+
+
+@dataclass(frozen=True)
+class _BlockJob(Job):
+    """A step on every block; where a camera is given, it is seen from the first pixel of each."""
+
+    grid: Grid
+
+    def arrays(self) -> dict[str, str]:
+        """The arrays that the step fills, and their types."""
+        raise NotImplementedError
+
+    def prepare(self, frames: list[FrameSource], fresh: bool) -> None:
+        size = min(self.grid.size, max(self.grid.shape))
+        arrays = {name: (kind, self.grid.shape, (size, size)) for name, kind in self.arrays().items()}
+        prepare_arrays(self.out, arrays, fresh)
+
+    def write(self, index: int, arrays: dict[str, np.ndarray]) -> Outputs:
+        return write_region(self.out, arrays, self.grid.window(index), self.grid.place(index))
+
+    def image(self, source: FrameSource, around: tuple[int, ...]) -> tuple[np.ndarray, dict[str, Any]]:
+        """A block with what overlaps it, and its geometry."""
+        src, geometry = source.read(**self.options)
+        if geometry.get("K") is not None:
+            camera = ScanLineParams(K=geometry["K"], distCoeffs=geometry.get("distCoeffs"))
+            K = np.array(camera.K)
+            K[:2, 2] -= around[1], around[0]
+            geometry |= {"K": K, "distCoeffs": camera.distCoeffs}
+        return src, geometry
+
+
+class _Edges(_BlockJob):
+    def arrays(self) -> dict[str, str]:
+        return dict(TASKS["detect"].frames)
+
+    def __call__(self, task: tuple[int, FrameSource]) -> tuple[Outputs, Counts]:
+        index, source = task
+        window, around = self.grid.window(index), self.grid.window(index, self.told["overlap"])
+        src, geometry = self.image(source, around)
+        found, _ = TASKS["detect"].arrays(RangeImage(src, geometry))
+        own = {name: inside(values, window, around) for name, values in found.items()}
+        return self.write(index, own), {"edgePixels": int(np.count_nonzero(own["edges"]))}
+
+
+class _Distances(_BlockJob):
+    def arrays(self) -> dict[str, str]:
+        return {"distance": "f4"}
+
+    def __call__(self, task: tuple[int, FrameSource]) -> tuple[Outputs, Counts]:
+        """With as much around the block as it takes to know that no edge beyond is nearer."""
+        index, _ = task
+        edges = open_arrays(self.out)["edges"]
+        window, margin = self.grid.window(index), self.told["overlap"]
+        while True:
+            around = self.grid.window(index, margin)
+            top, left, bottom, right = around
+            distance = inside(distanceTransform(edges[top:bottom, left:right]), window, around)
+            unsure = distance > clearance(window, around, self.grid.shape)
+            if not unsure.any() or margin >= _REACH:
+                return self.write(index, {"distance": distance}), {"unsurePixels": int(np.count_nonzero(unsure))}
+            farthest = distance[unsure].max()
+            margin = min(_REACH, int(np.ceil(farthest)) if np.isfinite(farthest) else 2 * margin + 64)
+
+
+class _Parts(_BlockJob):
+    def arrays(self) -> dict[str, str]:
+        return {"parts": "i4"}
+
+    def __call__(self, task: tuple[int, FrameSource]) -> tuple[Outputs, Counts]:
+        """Labels of a block by itself, and what it calls the pixels beyond its seams."""
+        index, source = task
+        window, around = self.grid.window(index), self.grid.window(index, self.told["overlap"])
+        src, geometry = self.image(source, around)
+        labels = segmentRegions(src, **geometry)
+        own = np.unique(inside(labels, window, around))
+        numbers = np.zeros(labels.max() + 1, np.int32)
+        numbers[own[own > 0]] = np.arange(1, np.count_nonzero(own) + 1)
+        labels = numbers[labels]
+        strips = {
+            str(other): inside(labels, strip, around)
+            for other, strip in self.grid.beyond(index, min(_STRIP, self.told["overlap"]))
+        }
+        outputs = self.write(index, {"parts": inside(labels, window, around)})
+        outputs |= write_file(self.out, _strips(self.out, index), packed(strips))
+        return outputs, {"regions": int(labels.max())}
+
+
+class _Labels(_BlockJob):
+    def arrays(self) -> dict[str, str]:
+        return {"labels": "i4"}
+
+    def __call__(self, task: tuple[int, FrameSource]) -> tuple[Outputs, Counts]:
+        """The labels of a block as they are called in the whole."""
+        index, _ = task
+        top, left, bottom, right = self.grid.window(index)
+        parts = open_arrays(self.out)["parts"][top:bottom, left:right]
+        first, behind = self.told["first"][index : index + 2] + 1
+        own = np.concatenate([[0], self.told["numbers"][first:behind]]).astype(np.int32)
+        return self.write(index, {"labels": own[parts]}), {"regions": len(np.unique(own)) - 1}
+
+
+# The steps of a task, the second of which needs the whole of the first.
+_PASSES = {"detect": ("edges", "distance"), "segment": ("parts", "labels")}
+_STEPS: dict[str, type[_BlockJob]] = {"edges": _Edges, "distance": _Distances, "parts": _Parts, "labels": _Labels}
+
+
+def _strips(root: Path, index: int) -> str:
+    """The file of what a block calls the pixels beyond its seams; beside the store, which has arrays alone."""
+    return f"../{root.name}.seams/{index}.npz"
+
+
+def _numbering(root: Path, grid: Grid) -> dict[str, np.ndarray]:
+    """How many labels come before those of each block, and the numbers of all in the whole."""
+    lines = {line["index"]: line for line in read_lines(_manifest(root, "parts")).values()}
+    counts = [lines[index]["counts"].get("regions", 0) for index in range(len(grid))]
+    first = np.concatenate([[0], np.cumsum(counts)])
+    parts, pairs = open_arrays(root)["parts"], []
+    for index in range(len(grid)):
+        if lines[index]["state"] != "written":
+            continue
+        with np.load(root / _strips(root, index)) as strips:
+            for other, (top, left, bottom, right) in grid.beyond(index, _STRIP):
+                ones = strips[str(other)]
+                others = parts[top:bottom, left:right][: ones.shape[0], : ones.shape[1]]
+                found = matches(ones, others)
+                pairs += [(first[index] + one, first[other] + another) for one, another in found]
+    return {"first": first, "numbers": joined(int(first[-1]), pairs)}

@@ -1,0 +1,122 @@
+"""A job on every frame, with a manifest: those done already left alone, and each done whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .. import __version__
+from .._check import error
+from ..frames import outcomes_of
+from ..io import RangeImage
+from ..recording import FrameSource
+from ..recording.manifest import Line, Manifest, changed, complete
+from .results import plain
+from .tasks import Counts
+
+_STAGE = re.compile(r"\.[0-9a-f]{32}\.tmp")  # what a run that was killed may leave behind
+
+
+class BatchItem(NamedTuple):
+    """What became of one frame."""
+
+    path: str
+    folder: str
+    state: str  # "written", "skipped" or "failed"
+    message: str  # of the error, or empty
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is done with each frame, by a call with its index and itself in the process that does it.
+
+    `options` are those of the function; `told` is what else a result depends on.
+    """
+
+    out: Path
+    options: dict[str, Any]
+    told: dict[str, Any]
+
+    def __call__(self, task: tuple[int, FrameSource]) -> tuple[dict[str, int], Counts]:
+        """Do it: the files written with their sizes, and what was found."""
+        raise NotImplementedError
+
+    def prepare(self, frames: list[FrameSource], fresh: bool) -> None:
+        """Make room for the results, `fresh` where there are none to be kept."""
+
+    def place(self, frame: FrameSource) -> Path:
+        """Where its results are."""
+        return self.out
+
+    def parameters(self, frame: FrameSource) -> dict[str, Any]:
+        """All that its results depend on but its pixels."""
+        known = RangeImage(np.empty(0), dict(frame.geometry)).withGeometry(**self.options).geometry
+        return plain({**known, **self.told})
+
+    def is_done(self, index: int, frame: FrameSource, lines: Mapping[str, Line]) -> bool:
+        """Whether its line in the manifest still holds."""
+        line = lines.get(frame.name)
+        return (
+            line is not None
+            and line.get("state") == "written"
+            and line.get("rangeedge") == __version__
+            and (line.get("input"), line.get("part")) == (frame.path, frame.part)
+            and line.get("modified") == changed(frame.path)
+            and line.get("parameters") == self.parameters(frame)
+            and complete(self.out, line)
+        )
+
+
+def run_frames(
+    job: Job, frames: list[FrameSource], manifest: Manifest, force: bool, **workers: Any
+) -> Iterator[BatchItem]:
+    """What becomes of each frame, in their order, each when it and those before it are done."""
+    with manifest.opened():
+        _sweep(job.out)
+        done = set() if force else {f.name for i, f in enumerate(frames) if job.is_done(i, f, manifest.lines)}
+        manifest.keep(done)
+        job.prepare(frames, fresh=not done)
+        pending = [(index, frame) for index, frame in enumerate(frames) if frame.name not in done]
+        modified = {frame.path: changed(frame.path) for _, frame in pending}
+        outcomes = outcomes_of(job, pending, **workers)
+        for index, frame in enumerate(frames):
+            where = str(job.place(frame))
+            if frame.name in done:
+                yield BatchItem(frame.title, where, "skipped", "")
+                continue
+            outcome = next(outcomes)
+            outputs, counts = outcome.value or ({}, {})
+            line = {
+                "frame": frame.name,
+                "input": frame.path,
+                "part": frame.part,
+                "index": index,
+                "state": "failed" if outcome.error else "written",
+                "outputs": outputs,
+                "counts": counts,
+                "seconds": round(outcome.seconds, 4),
+                "parameters": job.parameters(frame),
+                "modified": modified[frame.path],
+                "rangeedge": __version__,
+            }
+            manifest.append(line | {"error": outcome.error} if outcome.error else line)
+            yield BatchItem(frame.title, where, line["state"], outcome.error)
+            if outcome.full:
+                raise error(f"nothing more can be written to {str(job.out)!r}; make room, and run it again")
+
+
+def _sweep(out: Path) -> None:
+    """Remove what a killed run has left unfinished."""
+    for folder, folders, files in os.walk(out):
+        for name in filter(_STAGE.fullmatch, folders):
+            shutil.rmtree(Path(folder, name), ignore_errors=True)
+        for name in filter(_STAGE.fullmatch, files):
+            Path(folder, name).unlink(missing_ok=True)
+        folders[:] = [name for name in folders if not _STAGE.fullmatch(name)]

@@ -1,0 +1,217 @@
+"""One image in blocks: what is exact, what is close, and how it goes on."""
+
+import numpy as np
+import pytest
+
+from rangeedge import detectEdges, detectEdgesWithStrength, distanceTransform, error, imwriteRange, segmentRegions
+from rangeedge.app.cli import main
+from rangeedge.batch import runBlocks
+from rangeedge.io.tiff import images_of_tiff, read_page, read_window
+from rangeedge.recording.blocks import Grid, clearance, inside, joined, matches
+from rangeedge.recording.large import open_large
+
+OPTIONS = {"heightMap": True, "pixelSize": 0.5, "noise": 0.02}
+
+
+def terrain(rows=260, cols=330):
+    """Slopes with houses on them, in metres, without data in a corner."""
+    y, x = np.indices((rows, cols), dtype=np.float32)
+    heights = 0.05 * y + 3 * np.sin(x / 60) + np.random.default_rng(0).normal(0, 0.02, (rows, cols))
+    for top, left, height in ((20, 30, 4), (90, 100, 6), (110, 220, 5), (190, 40, 3), (200, 250, 7)):
+        heights[top : top + 40, left : left + 50] += height
+    heights[:15, :20] = np.nan
+    return heights.astype(np.float32)
+
+
+class TestGrid:
+    def test_every_pixel_is_in_one_block(self):
+        grid = Grid((23, 31), 8)
+        seen = np.zeros(grid.shape, int)
+        for index in range(len(grid)):
+            top, left, bottom, right = grid.window(index)
+            seen[top:bottom, left:right] += 1
+            above, before, below, behind = grid.window(index, 5)
+            assert (above, before) == (max(0, top - 5), max(0, left - 5))
+            assert (below, behind) == (min(23, bottom + 5), min(31, right + 5))
+        assert (seen == 1).all()
+        assert grid.counts == (3, 4)
+
+    def test_clearance_is_the_distance_to_the_nearest_unseen_pixel(self):
+        grid = Grid((23, 31), 8)
+        for index in range(len(grid)):
+            window, around = grid.window(index), grid.window(index, 3)
+            unseen = np.ones(grid.shape, bool)
+            unseen[around[0] : around[2], around[1] : around[3]] = False
+            found = np.broadcast_to(clearance(window, around, grid.shape), inside(unseen, window, (0, 0)).shape)
+            assert np.array_equal(found, inside(distanceTransform(unseen), window, (0, 0)))
+
+    def test_strips_beyond_the_seams(self):
+        assert list(Grid((20, 20), 8).beyond(0, 5)) == [(1, (0, 8, 8, 13)), (3, (8, 0, 13, 8))]
+        assert list(Grid((20, 20), 8).beyond(1, 5)) == [(2, (0, 16, 8, 20)), (4, (8, 8, 13, 16))]
+        assert list(Grid((20, 20), 8).beyond(8, 5)) == []
+
+
+class TestLabels:
+    def test_matches(self):
+        ones = np.array([[1, 1, 2, 2, 0, 3]])
+        others = np.array([[5, 5, 5, 6, 6, 0]])
+        assert matches(ones, others) == [(1, 5), (2, 5), (2, 6)]
+        assert matches(ones, np.zeros_like(ones)) == []
+
+    def test_joined(self):
+        assert joined(5, [(1, 4), (4, 5)]).tolist() == [0, 1, 2, 3, 1, 1]
+        assert joined(3, []).tolist() == [0, 1, 2, 3]
+        assert joined(0, []).tolist() == [0]
+
+
+@pytest.fixture(params=["npy", "tiff", "tiles"])
+def path(request, tmp_path):
+    heights = terrain()
+    if request.param == "npy":
+        np.save(tmp_path / "a.npy", heights)
+        return tmp_path / "a.npy"
+    tifffile = pytest.importorskip("tifffile")
+    more = (
+        {"tile": (64, 48), "compression": "zlib", "predictor": True}
+        if request.param == "tiles"
+        else {"rowsperstrip": 7}
+    )
+    tifffile.imwrite(tmp_path / "a.tif", heights, **more)
+    return tmp_path / "a.tif"
+
+
+class TestWindows:
+    @pytest.mark.parametrize("window", [(0, 0, 260, 330), (3, 5, 4, 6), (60, 40, 130, 100), (250, 300, 260, 330)])
+    def test_are_parts_of_the_whole(self, path, window):
+        top, left, bottom, right = window
+        image = open_large(str(path))
+        assert image.shape == (260, 330)
+        assert image.dtype == np.float32
+        if path.suffix == ".tif":
+            (page,) = images_of_tiff(path.read_bytes(), 9)
+            assert np.array_equal(read_page(page).src, terrain(), equal_nan=True)
+            assert np.array_equal(read_window(page, window).src, terrain()[top:bottom, left:right], equal_nan=True)
+
+    def test_elevations_know_their_pixels(self, tmp_path):
+        tifffile = pytest.importorskip("tifffile")
+        heights = terrain()
+        heights[40, 50] = -9999
+        tags = [(33550, 12, 3, (0.5, 0.5, 0.0)), (33922, 12, 6, (0, 0, 0, 1000.0, 2000.0, 0)), (42113, 2, 6, "-9999")]
+        tifffile.imwrite(tmp_path / "a.tif", heights, extratags=[(*tag, True) for tag in tags])
+        image = open_large(str(tmp_path / "a.tif"))
+        assert image.geometry == {"pixelSize": (0.5, 0.5), "heightMap": True}
+        assert image.georeference[:, 2].tolist() == [1000.25, 1999.75]
+        (page,) = images_of_tiff((tmp_path / "a.tif").read_bytes(), 9)
+        assert np.isnan(read_window(page, (40, 50, 41, 51)).src).all()
+
+
+@pytest.fixture
+def zarr():
+    return pytest.importorskip("zarr")
+
+
+class TestRuns:
+    def test_edges_and_distances(self, zarr, path, tmp_path):
+        out = tmp_path / "out.zarr"
+        items = list(runBlocks(path, out, blockSize=128, overlap=48, **OPTIONS))
+        assert [item.state for item in items] == ["written"] * 18
+        found = {name: array[:] for name, array in zarr.open_group(str(out), mode="r").arrays()}
+        edges, strength = detectEdgesWithStrength(terrain(), **OPTIONS)
+        assert np.count_nonzero(edges) > 500
+        assert np.count_nonzero(found["edges"] != edges) < 0.02 * np.count_nonzero(edges)
+        near = distanceTransform(edges) <= 1.5
+        assert near[found["edges"] > 0].all()
+        assert (found["jump"] != strength.jump).mean() < 0.01
+        assert np.array_equal(found["distance"], distanceTransform(found["edges"]))
+
+    def test_regions_are_joined(self, zarr, tmp_path):
+        np.save(tmp_path / "a.npy", terrain())
+        out = tmp_path / "out.zarr"
+        list(runBlocks(tmp_path / "a.npy", out, "segment", blockSize=128, overlap=64, **OPTIONS))
+        found = zarr.open_group(str(out), mode="r")["labels"][:]
+        labels = segmentRegions(terrain(), **OPTIONS)
+        assert found.max() == labels.max()
+        both = (found > 0) & (labels > 0)
+        pairs, counts = np.unique(np.stack([found[both], labels[both]]), axis=1, return_counts=True)
+        same = sum(counts[pairs[1] == label].max() for label in range(1, labels.max() + 1))
+        assert same > 0.98 * np.count_nonzero(labels)
+
+    def test_far_from_every_edge_distances_are_exact_too(self, zarr, tmp_path):
+        heights = np.zeros((200, 400), np.float32)
+        heights[:, 390:] = 5
+        np.save(tmp_path / "a.npy", heights)
+        list(runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", blockSize=64, overlap=16, **OPTIONS))
+        found = zarr.open_group(str(tmp_path / "out.zarr"), mode="r")
+        assert np.array_equal(found["distance"][:], distanceTransform(found["edges"][:]))
+        assert found["distance"][0, 0] == 390
+
+    def test_a_camera_is_seen_from_each_block(self, zarr, tmp_path):
+        K = np.array([[200.0, 0, 159.5], [0, 200, 99.5], [0, 0, 1]])
+        y, x = np.indices((200, 320))
+        depth = np.float32(1.0) / (0.5 + 0.002 * x + 0.001 * np.abs(y - 100))
+        depth = (depth + np.random.default_rng(0).normal(0, 2e-4, depth.shape)).astype(np.float32)
+        np.save(tmp_path / "a.npy", depth)
+        options = {"K": K, "noise": 2e-4, "creaseThreshold": 15.0}
+        list(runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", blockSize=160, overlap=80, **options))
+        found = zarr.open_group(str(tmp_path / "out.zarr"), mode="r")
+        edges, strength = detectEdgesWithStrength(depth, **options)
+        assert np.count_nonzero(edges) > 200
+        assert (distanceTransform(edges)[found["edges"][:] > 0] <= 1.5).mean() > 0.98
+        both = (found["crease"][:] > 15) & (strength.crease > 15)
+        assert np.count_nonzero(both) > 200
+        difference = np.abs(found["crease"][:] - strength.crease)
+        assert np.percentile(difference[:, :160][both[:, :160]], 90) < 0.1
+        assert np.percentile(difference[:, 160:][both[:, 160:]], 90) < 0.1
+
+    def test_processes_and_resuming_change_nothing(self, zarr, tmp_path):
+        np.save(tmp_path / "a.npy", terrain())
+        argv = [str(tmp_path / "a.npy"), "--height-map", "--pixel-size", "0.5", "--noise", "0.02"]
+        argv = ["batch", *argv, "--blocks", "128", "--overlap", "48", "--out"]
+        assert main([*argv, str(tmp_path / "one.zarr")]) == 0
+        assert main([*argv, str(tmp_path / "two.zarr"), "--jobs", "2"]) == 0
+        chunk = tmp_path / "two.zarr" / "edges" / "c" / "1" / "1"
+        chunk.write_bytes(b"half")
+        assert main([*argv, str(tmp_path / "two.zarr"), "--resume"]) == 0
+        ones, others = (
+            {
+                file.relative_to(tmp_path / name): file.read_bytes()
+                for file in (tmp_path / name).rglob("*")
+                if file.is_file()
+            }
+            for name in ("one.zarr", "two.zarr")
+        )
+        assert ones == others
+
+    def test_noise_is_estimated_once(self, zarr, tmp_path):
+        np.save(tmp_path / "a.npy", terrain())
+        options = {"heightMap": True, "pixelSize": 0.5}
+        list(runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", blockSize=128, overlap=48, **options))
+        found = zarr.open_group(str(tmp_path / "out.zarr"), mode="r")["edges"][:]
+        edges = detectEdges(terrain(), **options)
+        assert np.count_nonzero(found != edges) < 0.05 * np.count_nonzero(edges)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"task": "lines"}, "`task` must be 'detect' or 'segment'"),
+        ({"blockSize": 8}, "`blockSize`"),
+        ({"overlap": -1}, "`overlap`"),
+        ({"noise": np.ones((3, 4))}, "`noise` must be a number or a NoiseModel with blocks"),
+        ({"minArea": 9}, "`minArea` is no option of 'detect'"),
+    ],
+)
+def test_bad_arguments(tmp_path, more, message):
+    np.save(tmp_path / "a.npy", terrain())
+    with pytest.raises(error, match=f"runBlocks: {message}"):
+        runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", **more)
+    with pytest.raises(error, match="`out` must be a Zarr store"):
+        runBlocks(tmp_path / "a.npy", tmp_path / "out")
+
+
+def test_what_is_no_large_image(zarr, tmp_path):
+    np.save(tmp_path / "a.npy", np.zeros((3, 40, 50)))
+    imwriteRange(tmp_path / "b.png", np.ones((40, 50), np.uint16))
+    for name, message in (("a.npy", "no image"), ("b.png", "TIFF, NPY and Zarr"), ("c.tif", "No such file")):
+        with pytest.raises(error, match=message):
+            runBlocks(tmp_path / name, tmp_path / "out.zarr")
