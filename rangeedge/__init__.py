@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ._check import error
-from .adjacency import regionAdjacency
+from .adjacency import regionAdjacency, regionCorners
 from .boundaries import RegionBoundaries, RegionBoundary, regionBoundaries
 from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
@@ -63,7 +63,8 @@ from .explain import Explanation, explainPixel
 from .flying import flyingPixels
 from .frames import mapFrames
 from .io import RangeImage, imreadRange, imwriteRange
-from .io.lines import writeLines
+from .io.lines import readLines, writeLines
+from .io.polylines import Line, toLines
 from .noise import estimateNoise
 from .noise_model import NoiseModel
 from .options import ScanLineParams
@@ -120,7 +121,10 @@ __all__ = [  # noqa: RUF022
     "linkEdges",
     "Segments",
     "fitSegments",
+    "Line",
+    "toLines",
     "writeLines",
+    "readLines",
     "closeContours",
     "distanceTransform",
     "distanceTransformWithLabels",
@@ -136,6 +140,7 @@ __all__ = [  # noqa: RUF022
     "RegionBoundaries",
     "regionBoundaries",
     "regionAdjacency",
+    "regionCorners",
     "cleanDepth",
     "drawEdges",
     "drawChains",

@@ -13,6 +13,7 @@ from .constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
 from .frame import Frame
 from .noise import measured_frame
 from .options import MEASURED, ScanLineParams
+from .projection import to_pixels
 from .surfaces import surfaces_of
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ PAIR = np.dtype(
         ("first", "i4"),
         ("second", "i4"),
         ("contacts", "i4"),
+        ("length", "f8"),
         ("kind", "u1"),
         ("jump", "f8"),
         ("dihedral", "f8"),
@@ -32,6 +34,9 @@ PAIR = np.dtype(
         ("direction", "3f8"),
     ]
 )
+CORNER = np.dtype([("labels", "3i4"), ("point", "3f8"), ("x", "f8"), ("y", "f8"), ("convex", "i4")])
+_TILE = 16  # pixels in which a border is taken for straight
+_REACH = 4  # pixels, beside the gap, from a corner to the contacts of each two of its planes
 _DEVIATIONS = 3.0  # of the noise, within which two surfaces meet
 _PARALLEL = 0.02  # sine of the angle below which planes have no line in common that is worth the name
 
@@ -71,7 +76,8 @@ def regionAdjacency(
     Returns
     -------
     pairs : structured ndarray
-        first < second, the labels; contacts, their number; kind, EDGE_JUMP, EDGE_CONVEX or EDGE_CONCAVE; jump, the
+        first < second, the labels; contacts, their number; length, of their common border in space, across the line of
+        sight where that is no straight line; kind, EDGE_JUMP, EDGE_CONVEX or EDGE_CONCAVE; jump, the
         median difference of depths along lines of sight, 0 where they meet; dihedral, the angle in degrees between the
         surfaces through the solid, below 180 of a convex, above of a concave edge, NaN of a jump; of two planes that
         meet the line in which they do so: the point of it nearest to the contacts, and its direction, a unit vector;
@@ -84,6 +90,7 @@ def regionAdjacency(
 
     See Also
     --------
+    regionCorners : Where three planes meet.
     linkEdges : The edges themselves.
 
     Examples
@@ -97,12 +104,110 @@ def regionAdjacency(
     """
     (params,) = parsed(options, ScanLineParams)
     frame = measured_frame(src, params, mask)
-    labels = np.where(frame.valid > 0, np.maximum(labels32s("labels", labels, frame.shape), 0), 0)
-    gap = integer("gap", gap, 0, 64)
-    minContacts = integer("minContacts", minContacts, 1)
+    gap, minContacts = integer("gap", gap, 0, 64), integer("minContacts", minContacts, 1)
+    found, _ = _neighbours(frame, labels32s("labels", labels, frame.shape, listed=True), gap, minContacts)
+    return np.array([pair for pair, _ in found], PAIR)
+
+
+@takes(MEASURED)
+def regionCorners(
+    src: np.ndarray,
+    labels: np.ndarray,
+    gap: int = 2,
+    minContacts: int = 3,
+    *,
+    mask: np.ndarray | None = None,
+    **options: Unpack[GeometryOptions],
+) -> np.ndarray:
+    """Find the corners in which three planes meet: those of boxes and of rooms.
+
+    regionCorners(src, labels[, gap[, minContacts]], *[, mask[, K[, ...]]]) -> corners
+
+    Of three plane regions, each two of which meet (`regionAdjacency`), the point that lies on all three planes is a
+    corner where each two of them have a contact within a few pixels of it.
+
+    Parameters
+    ----------
+    src, labels, gap, minContacts, mask
+        As in `regionAdjacency`.
+    {options}
+
+    Returns
+    -------
+    corners : structured ndarray
+        labels (3), in rising order; point, in the unit of the image; x and y, its pixel, of an image of points that of
+        the nearest contact; convex, how many of its three edges are: 3 at the corner of a box, 0 in that of a room.
+
+    Raises
+    ------
+    rangeedge.error
+        On a bad argument.
+
+    See Also
+    --------
+    fitSegments : The vertices in which edges meet, without regions.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rangeedge import regionCorners
+    >>> y, x = np.mgrid[:30, :40].astype(float)
+    >>> planes = np.stack([x - 20, y - 12, 0.5 * (32 - x - y)])
+    >>> corners = regionCorners(-planes.max(axis=0), planes.argmax(axis=0).astype(np.int32) + 1, noise=0.001)
+    >>> corners["labels"].tolist(), corners["point"].round(3).tolist(), corners["convex"].tolist()
+    ([[1, 2, 3]], [[20.0, 12.0, 0.0]], [0])
+    """
+    (params,) = parsed(options, ScanLineParams)
+    frame = measured_frame(src, params, mask)
+    gap, minContacts = integer("gap", gap, 0, 64), integer("minContacts", minContacts, 1)
+    found, surfaces = _neighbours(frame, labels32s("labels", labels, frame.shape, listed=True), gap, minContacts)
+    lines = {pair[:2]: (pair[4], pixels) for pair, pixels in found if np.isfinite(pair[-1]).all()}
+    beside: dict[int, set[int]] = {}
+    for first, second in lines:
+        beside.setdefault(first, set()).add(second)
+    points = frame.points.reshape(-1, 3)
+    corners = []
+    for first, second in sorted(lines):
+        for third in sorted(beside[first] & beside.get(second, set())):
+            edges = [lines[pair] for pair in ((first, second), (first, third), (second, third))]
+            corner = _corner(frame, points, surfaces[[first, second, third]], [pixels for _, pixels in edges], gap)
+            if corner is not None:
+                convex = sum(kind == EDGE_CONVEX for kind, _ in edges)
+                corners.append(((first, second, third), *corner, convex))
+    return np.array(corners, CORNER)
+
+
+def _corner(
+    frame: Frame, points: np.ndarray, planes: np.ndarray, contacts: list[np.ndarray], gap: int
+) -> tuple[np.ndarray, float, float] | None:
+    """The point on three planes and its pixel, where contacts of each two of them are near it."""
+    normals = planes["normal"]
+    if abs(np.linalg.det(normals)) < _PARALLEL:
+        return None
+    point = np.linalg.solve(normals, (normals * planes["centroid"]).sum(axis=1))
+    nearest = [pixels[np.linalg.norm(points[pixels] - point, axis=1).argmin()] for pixels in contacts]
+    places = np.stack(np.unravel_index(nearest, frame.shape)[::-1], axis=1).astype(np.float64)
+    if frame.samples.ndim == 2:
+        x, y, _ = to_pixels(point, frame).tolist()
+        off = np.linalg.norm(places - (x, y), axis=1)
+    else:
+        lengths = np.linalg.norm(points[nearest] - point, axis=1)
+        x, y = places[lengths.argmin()].tolist()
+        off = np.linalg.norm(places - (x, y), axis=1)
+        size = np.linalg.norm(points[nearest[0]] - points[nearest], axis=1).max()
+        if lengths.max() > max(size, 1e-300) * _REACH:
+            return None
+    return (point, x, y) if (off <= gap + _REACH).all() else None
+
+
+def _neighbours(
+    frame: Frame, labels: np.ndarray, gap: int, minContacts: int
+) -> tuple[list[tuple[tuple, np.ndarray]], np.ndarray]:
+    """The pairs of `regionAdjacency`, each with the pixels of its contacts; and the surfaces of all regions."""
+    labels = np.where(frame.valid > 0, np.maximum(labels, 0), 0)
     i, j = _contacts(labels, gap, frame.seam)
     if not len(i):
-        return np.zeros(0, PAIR)
+        return [], np.zeros(0)
     surfaces = surfaces_of(frame, labels, int(labels.max()) + 1)
     flat = labels.ravel()
     code = flat[i].astype(np.int64) * len(surfaces) + flat[j]
@@ -110,7 +215,7 @@ def regionAdjacency(
     groups = np.split(order, np.flatnonzero(np.diff(code[order])) + 1)
     points = frame.points.reshape(-1, 3)
     found = [pair for g in groups for pair in _pairs(frame, points, surfaces, flat, i[g], j[g], minContacts)]
-    return np.array(found, PAIR)
+    return found, surfaces
 
 
 def _contacts(labels: np.ndarray, gap: int, seam: int | None) -> tuple[np.ndarray, np.ndarray]:
@@ -144,11 +249,11 @@ def _pairs(
     i: np.ndarray,
     j: np.ndarray,
     least: int,
-) -> Iterator[tuple]:
+) -> Iterator[tuple[tuple, np.ndarray]]:
     first, second = int(labels[i[0]]), int(labels[j[0]])
     here = [_planes(surfaces[label], points[pixels]) for label, pixels in ((first, i), (second, j))]
     # From a pixel before the first one of a contact to one after the second.
-    places = _sights(frame, points, i), _sights(frame, points, j)
+    places = _sights(frame, points[i]), _sights(frame, points[j])
     step = (places[1] - places[0]) / np.maximum(_distance(frame, i, j), 1)[:, None]
     shares = [places[0] - step, (places[0] + places[1]) / 2, places[1] + step]
     before, middle, after = (_depth(frame, *here[0], place) - _depth(frame, *here[1], place) for place in shares)
@@ -157,7 +262,10 @@ def _pairs(
     nowhere = (np.nan,) * 3
     if np.count_nonzero(~meets) >= least:
         jump = float(np.median(np.abs(middle)[~meets]))
-        yield first, second, np.count_nonzero(~meets), EDGE_JUMP, jump, np.nan, nowhere, nowhere
+        length = _length(frame, points, i[~meets], j[~meets], step[~meets], None)
+        count = np.count_nonzero(~meets)
+        pixels = np.concatenate([i[~meets], j[~meets]])
+        yield (first, second, count, length, EDGE_JUMP, jump, np.nan, nowhere, nowhere), pixels
     if np.count_nonzero(meets) < least:
         return
     normals = [normal[meets].mean(axis=0) for _, normal in here]
@@ -165,10 +273,35 @@ def _pairs(
     apart = normals[0] - normals[1]
     angle = np.degrees(2 * np.arctan2(np.linalg.norm(apart), np.linalg.norm(normals[0] + normals[1])))
     convex = np.mean((after - before)[meets]) < 0  # of a ridge either surface, continued, hides the other
-    near = points[np.concatenate([i[meets], j[meets]])].mean(axis=0)
-    line = _intersection(surfaces[first], surfaces[second], near) or (nowhere, nowhere)
+    pixels = np.concatenate([i[meets], j[meets]])
+    line = _intersection(surfaces[first], surfaces[second], points[pixels].mean(axis=0))
     kind = EDGE_CONVEX if convex else EDGE_CONCAVE
-    yield first, second, np.count_nonzero(meets), kind, 0.0, 180 - angle if convex else 180 + angle, *line
+    length = _length(frame, points, i[meets], j[meets], step[meets], None if line is None else line[1])
+    solid = 180 - angle if convex else 180 + angle
+    yield (first, second, np.count_nonzero(meets), length, kind, 0.0, solid, *(line or (nowhere, nowhere))), pixels
+
+
+def _length(
+    frame: Frame, points: np.ndarray, i: np.ndarray, j: np.ndarray, step: np.ndarray, direction: np.ndarray | None
+) -> float:
+    """How long a border is by its contacts i, j, between whose lines of sight lies a `step` a pixel.
+
+    In every tile as many pixels as the diagonal of its contacts along rows and columns, each as long as what a pixel
+    sees of a line of that direction, or across the line of sight.
+    """
+    rows, cols = np.unravel_index(i, frame.shape)
+    _, tile, count = np.unique(rows // _TILE * frame.shape[1] + cols // _TILE, return_inverse=True, return_counts=True)
+    beside = np.unravel_index(j, frame.shape)[0] == rows
+    along_rows = np.bincount(tile, beside)
+    pixels = np.hypot(along_rows, count - along_rows)
+    middle = np.stack([np.bincount(tile, axis) / count for axis in ((points[i] + points[j]) / 2).T], axis=1)
+    size = np.bincount(tile, np.linalg.norm(step, axis=1)) / count
+    scale = np.abs(_along(frame, middle)) if frame.projective else np.ones(len(middle))
+    if direction is not None:
+        ahead = 1e-4 * scale[:, None] * direction
+        seen = np.linalg.norm(_sights(frame, middle + ahead) - _sights(frame, middle), axis=1)
+        scale = np.linalg.norm(ahead, axis=1) / np.maximum(seen, 1e-300)
+    return float((pixels * size * scale).sum())
 
 
 def _planes(surface: np.void, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -180,10 +313,10 @@ def _planes(surface: np.void, points: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return points, gradient / np.maximum(np.linalg.norm(gradient, axis=1, keepdims=True), 1e-300)
 
 
-def _sights(frame: Frame, points: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """Where lines of sight pass the plane of the image, or the unit sphere, in the axes of the points."""
-    along = _along(frame, points[pixels])[:, None]
-    return (points[pixels] - frame.origin) / along if frame.projective else points[pixels] - along * frame.axes[2]
+def _sights(frame: Frame, points: np.ndarray) -> np.ndarray:
+    """Where lines of sight to points pass the plane of the image, or the unit sphere, in the axes of the points."""
+    along = _along(frame, points)[:, None]
+    return (points - frame.origin) / along if frame.projective else points - along * frame.axes[2]
 
 
 def _along(frame: Frame, points: np.ndarray) -> np.ndarray:

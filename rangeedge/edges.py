@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     from ._typed import ScanLineOptions
 
-_KINDS = {
+KINDS = {
     "jump": EDGE_JUMP,
     "occluding": EDGE_OCCLUDING,
     "occluded": EDGE_OCCLUDED,
@@ -85,8 +85,8 @@ def kindNames(kind: int) -> str:
     >>> kindNames(EDGE_JUMP | EDGE_OCCLUDING | EDGE_CONVEX)
     'jump occluding convex'
     """
-    kind = integer("kind", kind, 0, sum(_KINDS.values()))
-    return " ".join(name for name, bit in _KINDS.items() if kind & bit) or "none"
+    kind = integer("kind", kind, 0, sum(KINDS.values()))
+    return " ".join(name for name, bit in KINDS.items() if kind & bit) or "none"
 
 
 @public

@@ -12,16 +12,16 @@ import numpy as np
 from ._check import array, described, fail, integer, public
 from .io import RangeImage, imreadRange
 from .io.source import file_name
-from .recording.source import FrameSource
 
 if TYPE_CHECKING:
+    from .recording import FrameSource
     from .recording.workers import Outcome
 
 
 class FrameResult(NamedTuple):
     """What became of one frame: what the function returned, or the error that stopped it."""
 
-    index: int
+    frame: int
     value: Any
     error: str
     seconds: float
@@ -63,8 +63,8 @@ def mapFrames(
     Returns
     -------
     results : iterator of FrameResult
-        ``index``, ``value``, ``error`` (empty where all went well) and ``seconds``; in the order of the frames, each as
-        soon as it and those before it are done.
+        ``frame`` (its number), ``value``, ``error`` (empty where all went well) and ``seconds``; in the order of the
+        frames, each as soon as it and those before it are done.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def mapFrames(
     >>> stack = np.full((3, 48, 64), 2.0)
     >>> stack[:, 12:36, 16:48] = 1.5
     >>> results = mapFrames(stack, functools.partial(detectEdges, noise=0.001, pixelSize=0.01))
-    >>> [(result.index, int(np.count_nonzero(result.value))) for result in results]
+    >>> [(result.frame, int(np.count_nonzero(result.value))) for result in results]
     [(0, 104), (1, 104), (2, 104)]
     """
     if not callable(function):
@@ -122,6 +122,8 @@ def _each(frames: Any) -> Iterator[Any]:
 
 
 def _on_frame(function: Callable[..., Any], frame: Any) -> Any:
+    from .recording import FrameSource
+
     if isinstance(frame, FrameSource):
         frame = frame.read()
     elif isinstance(frame, (str, os.PathLike)):

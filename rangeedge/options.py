@@ -212,7 +212,7 @@ class ScanLineParams(Options):
         kept="tuple[tuple[float, float], ...] | None",
         read=_parse.invalid_values,
         metavar="V|LOW:HIGH[,...]",
-        flagged="values as stored, and ranges of them, that are no data: --invalid=-9999 or 0,8000:inf",
+        flagged="values as stored, and ranges of them, that are no data: --invalid=-9999 or 0,8000:inf, or none",
     )
     origin: Sequence[float] | None = option(
         None,

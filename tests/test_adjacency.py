@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, regionAdjacency
+from rangeedge import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, regionAdjacency, regionCorners
 from rangeedge.synthetic import box, cylinder, gaussianNoise, pinholeCamera, plane, renderScene
 
 K = np.array([[300.0, 0, 159.5], [0, 300, 119.5], [0, 0, 1]])
@@ -106,3 +106,48 @@ def test_bad_arguments_are_named(call, text):
     with pytest.raises(rangeedge.error) as problem:
         call()
     assert text in str(problem.value)
+
+
+@pytest.mark.parametrize("sigma", [0, 0.0005])
+def test_borders_have_the_length_of_the_edges_and_corners_lie_where_planes_meet(sigma):
+    size = np.array([0.3, 0.25, 0.2])
+    scene = [plane((0, 0, 1.5), (0, -0.2, -1)), box((0, 0, 1.0), tuple(size), AXES)]
+    rendering = renderScene(scene, CAMERA)
+    depth = rendering.depth + (np.random.default_rng(0).normal(0, sigma, rendering.depth.shape) if sigma else 0)
+    geometry = CAMERA.geometry
+    pairs = regionAdjacency(depth, rendering.labels, noise=max(sigma, 1e-5), **geometry)
+    convex = pairs[pairs["kind"] == EDGE_CONVEX]
+    assert len(convex) == 3
+    for pair in convex:
+        side = np.abs(AXES.T @ pair["direction"]).argmax()
+        assert pair["length"] == pytest.approx(size[side], rel=0.05)
+    (corner,) = regionCorners(depth, rendering.labels, noise=max(sigma, 1e-5), **geometry)
+    ends = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]) * size / 2 @ AXES.T + (0, 0, 1.0)
+    assert np.linalg.norm(ends - corner["point"], axis=1).min() < (2e-6 if not sigma else 3e-4)
+    assert corner["convex"] == 3
+    assert corner["labels"].tolist() == sorted({*convex["first"].tolist(), *convex["second"].tolist()})
+    at = rangeedge.project(corner["point"], **geometry)
+    assert (corner["x"], corner["y"]) == pytest.approx(tuple(at[:2]))
+    points = rangeedge.backproject(depth, **geometry)
+    (same,) = regionCorners(points, rendering.labels, noise=max(sigma, 1e-5))
+    assert np.allclose(same["point"], corner["point"], atol=1e-6)
+    assert np.hypot(same["x"] - corner["x"], same["y"] - corner["y"]) < 4
+
+
+def test_lengths_of_slanted_borders_and_of_jumps():
+    v, u = np.indices((60, 80)).astype(float)
+    for slope in (0.0, 0.5, 1.0, 2.0):
+        labels = np.where(u < 10 + slope * v / 2, 1, 2).astype(np.int32)
+        pairs = regionAdjacency(np.where(labels == 1, 5.0, 9.0), labels, pixelSize=0.1, noise=0.01)
+        assert pairs["kind"].tolist() == [1]
+        assert pairs["length"][0] == pytest.approx(0.1 * 60 * np.hypot(1, slope / 2), rel=0.06)
+
+
+def test_planes_that_do_not_meet_in_a_corner_have_none():
+    x = np.arange(60.0) * np.ones((30, 1))
+    labels = (1 + x // 20).astype(np.int32)
+    folded = np.select([x < 20, x < 40], [20 - x, 0 * x], x - 40)
+    assert len(regionCorners(folded, labels, noise=0.001)) == 0
+    assert len(regionCorners(np.zeros((5, 6)), np.zeros((5, 6), np.int32), noise=0.1)) == 0
+    with pytest.raises(rangeedge.error, match="regionCorners: `labels` must be"):
+        regionCorners(np.zeros((5, 6)), np.zeros((5, 6)))

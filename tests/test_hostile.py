@@ -1,5 +1,6 @@
 """Arguments and surroundings that nobody means: all that comes of them is `rangeedge.error`."""
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -164,3 +165,13 @@ def test_commands_whose_output_has_no_room(command, tmp_path):
     assert run.stderr.startswith("rangeedge: error: cannot write")
     assert len(run.stderr.splitlines()) == 1
     assert (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("shape", [(1, 2), (3, 5), (24, 33), (64, 80)])
+@pytest.mark.parametrize("decades", [0, 300])
+def test_points_in_no_order_at_all(shape, decades):
+    rng = np.random.default_rng(shape[0])
+    points = rng.normal(size=(*shape, 3)) * 10.0 ** rng.integers(-decades, decades + 1, (*shape, 3))
+    for function in (rangeedge.detectEdges, rangeedge.segmentRegions):
+        with contextlib.suppress(rangeedge.error):
+            assert function(points).shape == shape

@@ -7,7 +7,22 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge import EDGE_CONVEX, EDGE_JUMP, drawChains, drawSegments, fitSegments, linkEdges, writeLines
+from rangeedge import (
+    EDGE_CONVEX,
+    EDGE_JUMP,
+    Line,
+    drawChains,
+    drawSegments,
+    fitSegments,
+    imreadRange,
+    linkEdges,
+    readLines,
+    regionBoundaries,
+    segmentRegions,
+    toLines,
+    writeLines,
+)
+from rangeedge.app.cli import main
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene, sphere
 
 K = np.array([[150.0, 0, 79.5], [0, 150, 59.5], [0, 0, 1]])
@@ -56,11 +71,12 @@ def test_ply_holds_vertices_and_edges(chains, tmp_path):
     counts = [int(line.split()[2]) for line in head.decode().splitlines() if line.startswith("element")]
     closed = sum(chain.closed for chain in chains)
     assert counts == [len(chains.points), len(chains.points) - len(chains) + closed]
-    vertices = np.frombuffer(body, "<f8", 3 * counts[0]).reshape(-1, 3)
-    assert np.array_equal(vertices, chains.points["point"])
-    edges = np.frombuffer(body, [("v", "<2i4"), ("kind", "u1"), ("angle", "<f4")], offset=24 * counts[0])
+    vertices = np.frombuffer(body, "<f8", 5 * counts[0]).reshape(-1, 5)
+    assert np.array_equal(vertices[:, :3], chains.points["point"])
+    assert np.array_equal(vertices[:, 3], chains.points["x"])
+    edges = np.frombuffer(body, [("v", "<2i4"), ("kind", "u1"), ("angle", "<f4")], offset=40 * counts[0])
     assert len(edges) == counts[1]
-    assert np.linalg.norm(np.diff(vertices[edges["v"]], axis=1), axis=2).sum() == pytest.approx(
+    assert np.linalg.norm(np.diff(vertices[edges["v"], :3], axis=1), axis=2).sum() == pytest.approx(
         chains.chains["length"].sum()
     )
     assert set(edges["kind"]) == {EDGE_JUMP, EDGE_CONVEX}
@@ -93,10 +109,131 @@ def test_geojson_holds_the_same_and_maps_pixels(chains, fitted, tmp_path):
     assert kinds == (fitted.segments["kind"] == EDGE_JUMP).tolist()
 
 
-@pytest.mark.parametrize("suffix", ["csv", "ply", "obj", "geojson"])
+SUFFIXES = ["csv", "ply", "obj", "geojson", "dxf", "svg"]
+HELD = {  # pixels, points, properties
+    "csv": (True, True, True),
+    "ply": (True, True, False),
+    "obj": (False, True, False),
+    "geojson": (False, True, True),
+    "dxf": (False, True, True),
+    "svg": (True, False, True),
+}
+
+
+@pytest.fixture(scope="module")
+def outlines(depth):
+    labels = segmentRegions(depth, K=K, noise=0.0005)
+    labels[60:70, 10:20] = 0  # a hole, and a region in another one
+    labels[20:50, 100:130] = 0
+    labels[30:40, 110:120] = 90
+    found = regionBoundaries(labels, depth, K=K)
+    assert found.rings["hole"].sum() >= 2
+    return found
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("what", ["chains", "fitted", "outlines"])
+def test_what_was_written_is_read(suffix, what, request, tmp_path):
+    if suffix == "dxf":
+        pytest.importorskip("ezdxf")
+    lines = request.getfixturevalue(what)
+    path = tmp_path / f"lines.{suffix}"
+    writeLines(path, lines)
+    expected, read = toLines(lines), readLines(path)
+    assert len(read) == len(expected) > 3
+    pixels, points, properties = HELD[suffix]
+    for line, known in zip(read, expected, strict=True):
+        assert (line.kind, line.closed) == (known.kind, known.closed)
+        assert line.pixels.shape == known.pixels.shape
+        assert line.points.shape == known.points.shape
+        assert np.array_equal(line.pixels, known.pixels) if pixels else np.isnan(line.pixels).all()
+        assert np.array_equal(line.points, known.points) if points else np.isnan(line.points).all()
+        if properties:
+            assert set(line.properties) == set(known.properties)
+            for name, value in known.properties.items():
+                assert line.properties[name] == value or (np.isnan(value) and np.isnan(line.properties[name]))
+    if suffix == "ply":
+        assert [line.properties.get("angle", np.nan) for line in read] == pytest.approx(
+            [line.angle for line in expected], rel=1e-6, nan_ok=True
+        )
+    writeLines(tmp_path / f"again.{suffix}", read)
+    if suffix != "dxf":  # which holds the time
+        assert (tmp_path / f"again.{suffix}").read_bytes() == path.read_bytes()
+    again = readLines(tmp_path / f"again.{suffix}")
+    assert all(np.array_equal(a.points, b.points, equal_nan=True) for a, b in zip(read, again, strict=True))
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
 def test_nothing_to_write_is_a_valid_file(suffix, tmp_path):
+    if suffix == "dxf":
+        pytest.importorskip("ezdxf")
     writeLines(tmp_path / f"none.{suffix}", [])
-    assert (tmp_path / f"none.{suffix}").exists()
+    assert readLines(tmp_path / f"none.{suffix}") == []
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_files_of_something_else_are_refused(suffix, tmp_path):
+    if suffix == "dxf":
+        pytest.importorskip("ezdxf")
+    path = tmp_path / f"other.{suffix}"
+    path.write_bytes(b"l 1 2 3\n{" if suffix != "svg" else b"<svg>")
+    with pytest.raises(rangeedge.error, match="it holds no lines"):
+        readLines(path)
+
+
+def test_outlines_are_polygons_on_a_map(outlines, tmp_path):
+    path = tmp_path / "regions.geojson"
+    writeLines(path, outlines, [[2, 0, 1000], [0, -2, 5000]], epsg=32633)
+    collection = json.loads(path.read_text())
+    assert collection["crs"]["properties"]["name"] == "urn:ogc:def:crs:EPSG::32633"
+    assert len(collection["features"]) == len(outlines)
+    for feature, region in zip(collection["features"], outlines, strict=True):
+        assert feature["geometry"]["type"] == "Polygon"
+        rings = feature["geometry"]["coordinates"]
+        assert len(rings) == 1 + len(region.holes)
+        assert rings[0][0] == rings[0][-1]
+        assert feature["properties"]["label"] == region.label
+        assert rings[0][0][:2] == pytest.approx((1000 + 2 * region.outline["x"][0], 5000 - 2 * region.outline["y"][0]))
+
+
+def test_a_drawing_has_its_picture_below(depth, chains, tmp_path):
+    path = tmp_path / "lines.svg"
+    picture = drawChains(depth, [], K=K)
+    writeLines(path, chains, picture=picture)
+    text = path.read_text()
+    assert 'width="160" height="120" viewBox="-0.5 -0.5 160 120"' in text
+    assert "data:image/png;base64," in text
+    assert len(readLines(path)) == len(chains)
+
+
+def test_lines_are_plain_objects(chains, fitted, outlines):
+    for lines in (chains, list(chains), fitted, fitted.segments, outlines, toLines(chains)):
+        plain = toLines(lines)
+        assert all(isinstance(line, Line) for line in plain)
+        json.dumps([[line.kind, line.closed, line.points.tolist(), line.properties] for line in plain])
+    assert len(toLines(outlines)) == len(outlines.rings)
+
+
+@pytest.mark.parametrize("command", ["lines", "segment"])
+@pytest.mark.parametrize("suffix", ["geojson", "svg", "obj"])
+def test_the_command_writes_one_file_by_its_suffix(command, suffix, depth, tmp_path):
+    image = tmp_path / "depth.npy"
+    np.save(image, depth)
+    out = tmp_path / f"found.{suffix}"
+    assert main([command, str(image), "-K", "150,150,79.5,59.5", "--noise", "0.0005", "--out", str(out)]) == 0
+    assert len(readLines(out)) > 3
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["depth.npy", f"found.{suffix}"]
+
+
+def test_lines_of_an_elevation_model_lie_on_its_map(tmp_path):
+    rows = np.abs(np.arange(50.0) - 25.2) * np.ones((40, 1))
+    head = "ncols 50\nnrows 40\nxllcorner 1000\nyllcorner 2000\ncellsize 2\n"
+    (tmp_path / "dem.asc").write_text(head + "\n".join(" ".join(f"{2 * v:.3f}" for v in row) for row in rows))
+    assert imreadRange(tmp_path / "dem.asc").georeference is not None
+    assert main(["lines", str(tmp_path / "dem.asc"), "--out", str(tmp_path / "valley.geojson")]) == 0
+    (valley,) = readLines(tmp_path / "valley.geojson")
+    assert valley.points[:, 0] == pytest.approx(1000 + 2 * 25.7, abs=0.05)
+    assert 2000 <= valley.points[:, 1].min() < valley.points[:, 1].max() <= 2080
 
 
 def test_pictures_show_chains_where_they_are(depth, chains):
@@ -124,11 +261,17 @@ def test_pictures_show_segments_vertices_and_lengths(depth, fitted):
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda: writeLines("a.dxf", []), "writeLines: cannot write 'a.dxf': the suffix must be one of .csv"),
+        (lambda: writeLines("a.xyz", []), "writeLines: cannot write 'a.xyz': the suffix must be one of .csv"),
+        (lambda: readLines("a.xyz"), "readLines: cannot read 'a.xyz': the suffix must be one of .csv"),
+        (lambda: readLines("/nowhere/at/all.obj"), "readLines: cannot read '/nowhere/at/all.obj': No such file"),
+        (lambda: toLines(3), "toLines: `lines` must be EdgeChains"),
+        (lambda: writeLines("a.geojson", [], epsg=0), "`epsg` must be the code of a reference system"),
+        (lambda: writeLines("a.obj", [], epsg=4326), "`epsg` must be None for .obj"),
+        (lambda: writeLines("a.svg", [], picture=np.ones((3, 4))), "`picture` must be a CV_8UC3 picture"),
         (lambda: writeLines(3, []), "writeLines: `filename` must be"),
         (lambda: writeLines("a.obj", [1]), "writeLines: `lines` must be EdgeChains"),
         (lambda: writeLines("a.obj", [], transform=(1, 2)), "`transform` must be None for .obj"),
-        (lambda: writeLines("a.geojson", [], transform=(1, 2)), "`transform` must be six finite numbers"),
+        (lambda: writeLines("a.geojson", [], transform=(1, 2)), "`transform` must be a (2, 3) array, or six finite"),
         (lambda: writeLines("/nowhere/at/all.obj", []), "cannot write '/nowhere/at/all.obj': No such file"),
         (lambda: drawChains(np.ones((4, 5)), 3), "drawChains: `chains` must be EdgeChains"),
         (lambda: drawChains(np.ones((4, 5)), [], scale=0), "drawChains: `scale` must be"),

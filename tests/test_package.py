@@ -24,10 +24,11 @@ PUBLIC = """
     estimateNoise ScanLineParams splitScanLine EdgeStrength edgeStrength edgePoints kindNames flyingPixels
     strengthImage overallStrength selectEdges thinEdges detectEdges detectEdgesWithStrength ScanLineDetector
     Explanation explainPixel
-    createScanLineDetector mapFrames EdgeChain EdgeChains linkEdges Segments fitSegments writeLines closeContours
+    createScanLineDetector mapFrames EdgeChain EdgeChains linkEdges Segments fitSegments
+    Line toLines writeLines readLines closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
     extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats
-    RegionBoundary RegionBoundaries regionBoundaries regionAdjacency cleanDepth
+    RegionBoundary RegionBoundaries regionBoundaries regionAdjacency regionCorners cleanDepth
     drawEdges drawChains drawSegments drawRegions drawBoundaries colorizeDistance drawOverview drawPanels
     drawExplanation
     DIR_ROWS DIR_COLS DIR_DIAG45 DIR_DIAG135 DIR_ALL FIT_LSQ FIT_INTERP MEASURE_MIDPOINT MEASURE_ENDPOINT

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge import detectEdges, imreadRange, imwriteRange
+from rangeedge import EDGE_CONVEX, EDGE_JUMP, detectEdges, imreadRange, imwriteRange, readLines
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
 
 SAMPLES = Path(__file__).resolve().parents[1] / "samples"
 PICTURES = {
+    "overview": ["overview.jpg"],
     "edges": ["edges.png"],
     "explain": ["explain.png"],
     "thinning": ["thinning.png"],
@@ -24,6 +25,10 @@ PICTURES = {
     "segmentation": ["segmentation.png"],
     "pipeline": ["candidates.png"],
     "box_dimensions": ["box_dimensions.png"],
+    "clean_depth": ["clean_depth.png"],
+    "weld_line": ["weld_line.png"],
+    "roof_ridges": ["roof_ridges.png"],
+    "stair_edges": ["stair_edges.png"],
     "live": ["live.png"],
 }
 OTHERS = {"calibration", "camera", "common", "elevation", "paper", "ros2_node", "scan_line", "scores", "tune"}
@@ -98,6 +103,41 @@ def test_the_box_is_measured_within_two_millimetres(tmp_path):
     sizes = run("box_dimensions", "--out", tmp_path)
     assert [count for _, _, count in sizes] == [3, 3, 3]
     assert np.allclose([length for length, _, _ in sizes], (0.20, 0.25, 0.30), atol=0.002)
+
+
+def test_depths_are_cleaned_better_than_by_filters(tmp_path):
+    found = run("clean_depth", "--out", tmp_path)
+    surfaces, edges, holes, filled = found["cleanDepth"]
+    assert surfaces < found["as measured"][0] / 2
+    assert edges < found["as measured"][1] / 2
+    assert holes < 1.5
+    assert filled > 0.95 * found["inpaint"][3]
+    assert all(surfaces < other[0] for name, other in found.items() if name != "cleanDepth")
+
+
+def test_toes_of_the_weld_are_found_within_twenty_micrometres(tmp_path):
+    left, right = run("weld_line", "--out", tmp_path)
+    for off in (left, right):
+        assert len(off) > 600
+        assert np.sqrt(np.mean(off**2)) < 0.02
+    assert len(readLines(tmp_path / "weld_line.csv")) == 2
+
+
+def test_ridges_and_eaves_lie_on_the_map(tmp_path):
+    off = run("roof_ridges", "--out", tmp_path)
+    assert sorted(len(own) for own in off.values()) == [3, 12]
+    assert max(off[EDGE_CONVEX]) < 0.05
+    assert max(off[EDGE_JUMP]) < 0.25  # a pixel
+    lines = readLines(tmp_path / "roof_ridges.geojson")
+    east, north, _ = np.concatenate([line.points for line in lines]).T
+    assert 358000 < east.min() < east.max() < 358080
+    assert 5811935 < north.min() < north.max() < 5812000
+
+
+def test_steps_are_measured_within_two_millimetres(tmp_path):
+    rises, treads = run("stair_edges", "--out", tmp_path)
+    assert np.allclose(rises, np.full(4, 0.17), atol=0.002)
+    assert np.allclose(treads, np.full(4, 0.28), atol=0.002)
 
 
 def test_pipeline_needs_a_camera(tmp_path, capsys):
@@ -221,9 +261,9 @@ def test_camera_runs_frames_through_one_detector(image, tmp_path, capsys):
         run("camera", image)
 
 
-def test_scores_prefer_rangeedge(capsys):
-    run("scores")
-    ours, canny, regions = capsys.readouterr().out.splitlines()
+def test_scores_prefer_rangeedge(tmp_path, capsys):
+    run("scores", "--out", tmp_path)
+    ours, canny, regions, _ = capsys.readouterr().out.splitlines()
     values = [[float(word.split()[-1]) for word in line.split(",")] for line in (ours, canny)]
     assert values[0][0] > 0.98 > values[1][0]
     assert values[0][1] > values[1][1]

