@@ -242,8 +242,8 @@ def write_folder(out: str | os.PathLike[str], files: Mapping[str, bytes]) -> Non
     """Write files into a folder, which is made where it is missing.
 
     Complete without names first, or under temporary ones, then renamed: no reader ever sees a part of a file, and a new
-    folder appears with all of them or not at all. In an existing folder they are replaced one by one, where the report is removed
-    first and comes last: a folder that has one holds results of one run.
+    folder appears with all of them or not at all. In an existing folder they are replaced one by one, where the report
+    is removed first and comes last: a folder that has one holds results of one run.
     """
     out = Path(out)
     ancestor = next(path for path in (out, *out.absolute().parents) if path.exists())
