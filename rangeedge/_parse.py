@@ -38,7 +38,9 @@ def point(text: str) -> list[float]:
 
 
 def invalid_values(text: str) -> list[float | list[float]]:
-    """Values and ranges low:high, joined by commas."""
+    """Values and ranges low:high, joined by commas; "none" of them."""
+    if text == "none":
+        return []
     ranges = []
     for part in text.split(","):
         numbers = _numbers(part.replace(":", ","), (1, 2), "values and ranges low:high, joined by commas")

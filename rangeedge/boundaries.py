@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple, overload
 
 import numpy as np
@@ -12,6 +12,7 @@ from ._check import boolean, labels32s, number
 from ._option import parsed, takes
 from .frame import Frame, read_frame
 from .options import GEOMETRY, ScanLineParams
+from .sectors import sectors_of
 from .surfaces import in_space, places, relative_ordinate
 
 if TYPE_CHECKING:
@@ -182,7 +183,7 @@ def boundaries_of(labels: np.ndarray, frame: Frame | None, tolerance: float, uni
     corners, arcs, steps, rings, names = _core.trace_outlines(labels)
     vertices = corners - 0.5
     counts, beside = np.ascontiguousarray(arcs[:, 1]), names[arcs[:, 2:]]
-    surfaces = None if frame is None else _Surfaces(frame, labels)
+    surfaces = None if frame is None else _surfaces(frame, labels)
     tolerances = np.full(len(arcs), tolerance)
     if units and surfaces is not None and len(arcs):
         tolerances /= surfaces.spacing(vertices[arcs[:, 0]], beside)
@@ -262,6 +263,10 @@ def _on_lines(vertices: np.ndarray, counts: np.ndarray, beside: np.ndarray, surf
     return moved
 
 
+def _surfaces(frame: Frame, labels: np.ndarray) -> _Surfaces | _SurfacesAround:
+    return _SurfacesAround(frame, labels) if sectors_of(frame) else _Surfaces(frame, labels)
+
+
 class _Surfaces:
     """Ordinates over the image as planes, or quadratics, of every label."""
 
@@ -321,3 +326,30 @@ class _Surfaces:
         known &= np.linalg.norm(rms, axis=1) < _REACH * slope
         slope = np.where(known, slope, 1)
         return normal / slope[:, None], (at_origin[:, 1] - at_origin[:, 0]) / slope, known
+
+
+class _SurfacesAround:
+    """The same of an image that looks all around: of every sector."""
+
+    flat_image = False
+
+    def __init__(self, frame: Frame, labels: np.ndarray) -> None:
+        self.parts = [(part, _Surfaces(part.frame, part.take(labels))) for part in sectors_of(frame)]
+
+    def points(self, vertices: np.ndarray, labels: np.ndarray) -> np.ndarray:
+        return self._of_sectors(vertices, lambda own, at, which: own.points(at, labels[which]), (3,))
+
+    def spacing(self, vertices: np.ndarray, beside: np.ndarray) -> np.ndarray:
+        return self._of_sectors(vertices, lambda own, at, which: own.spacing(at, beside[which]), ())
+
+    def _of_sectors(self, vertices: np.ndarray, function: Callable[..., np.ndarray], shape: tuple) -> np.ndarray:
+        """What a function makes of the surfaces, places and numbers of the vertices of each sector."""
+        result = np.empty((len(vertices), *shape))
+        for part, surfaces in self.parts:
+            axis = 1 - part.axis  # of x and y
+            start, stop = part.start - 0.5, part.start + part.end - part.first - 0.5
+            which = np.flatnonzero((vertices[:, axis] >= start) & (vertices[:, axis] <= stop))
+            at = vertices[which].copy()
+            at[:, axis] += part.first - part.start
+            result[which] = function(surfaces, at, which)
+        return result

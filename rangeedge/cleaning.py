@@ -18,6 +18,7 @@ from .frame import Frame
 from .noise import measured_frame
 from .options import CLEANING, Cleaning, Growing, ScanLineParams, Selection
 from .regions import seeded_regions
+from .sectors import sectors_of
 from .selection import select_strength
 from .surfaces import places, relative_ordinate
 from .thinning import thinEdges
@@ -105,6 +106,28 @@ def cleanDepth(
     frame = measured_frame(src, params, mask)
     values = range_array(src)[0]
     given = None if labels is None else labels32s("labels", labels, frame.shape)
+    inside = None if mask is None else image8("mask", mask, frame.shape)
+    return _cleaned(values, frame, params, cleaning, given, inside)
+
+
+def _cleaned(
+    values: np.ndarray,
+    frame: Frame,
+    params: ScanLineParams,
+    cleaning: Cleaning,
+    given: np.ndarray | None,
+    inside: np.ndarray | None,
+) -> CleanedDepth:
+    parts = sectors_of(frame)
+    if parts:
+        whole = CleanedDepth(np.empty_like(values), np.empty(frame.shape, np.uint8))
+        for part in parts:
+            own = (None if a is None else part.take(a) for a in (given, inside))
+            for all_values, found in zip(
+                whole, _cleaned(part.take(values), part.frame, params, cleaning, *own), strict=True
+            ):
+                part.put(all_values, found)
+        return whole
     flying = np.zeros(frame.shape, np.uint8)
     edges = _edges_and_flying(frame, params, flying) if given is None or cleaning.removeFlying else None
     if not cleaning.removeFlying:
@@ -115,8 +138,8 @@ def cleanDepth(
     else:
         found = np.where(kept.valid > 0, np.maximum(given, 0), 0).astype(np.int32)
     missing = kept.valid == 0
-    if mask is not None:
-        missing &= image8("mask", mask, frame.shape) != 0
+    if inside is not None:
+        missing &= inside != 0
     holes = _narrow(missing, cleaning.maxHole) if values.ndim == 2 else np.zeros(frame.shape, np.uint8)
     ordinate = _smoothed(frame, params, found, holes, flying > 0, cleaning.radius)
     return _delivered(values, frame, params, ordinate, flying > 0, cleaning)

@@ -12,14 +12,14 @@ import numpy as np
 from ._check import fail, integer
 from ._option import parsed, takes
 from .constants import EDGE_JUMP, EDGE_OCCLUDING
-from .detector import run_detector
+from .detector import run_detector, selected, thin_lines
 from .edges import kindNames, measure_strength
 from .frame import Frame
 from .noise import measured_frame
 from .noise_model import NoiseModel
 from .options import DETECTION, ScanLineParams, Selection
-from .selection import select_strength
-from .thinning import thinEdges
+from .pixels import components
+from .sectors import around
 from .traces import Cut, ScanLine, scan_lines
 
 if TYPE_CHECKING:
@@ -199,7 +199,7 @@ class _Case:
             return _Verdict("no data", "The pixel has no data, or is masked out.")
         if self.edge:
             return self._of_edge()
-        if select_strength(self.strength, own)[at]:
+        if selected(self.frame, self.strength, own)[at]:
             return _Verdict("thinned", "It is selected, but edges are one pixel wide: the line passes beside it.")
         jump_least, crease_least = (own.jumpThreshold or 0) * own.hysteresis, own.creaseThreshold * own.hysteresis
         nearer = bool(self.kind & EDGE_OCCLUDING)
@@ -232,10 +232,10 @@ class _Case:
     def _of_line(self, least: float) -> _Verdict:
         """Of a pixel that reaches the thresholds: stray, or on a line that does not stay."""
         at, own = (self.y, self.x), self.selection
-        lines = select_strength(self.strength, replace(own, **_EVERYTHING))
+        lines = selected(self.frame, self.strength, replace(own, **_EVERYTHING))
         if not lines[at]:
-            around = self.strength.crease[max(self.y - 1, 0) : self.y + 2, max(self.x - 1, 0) : self.x + 2]
-            strong = np.sort(around[around > 0])[::-1]
+            beside = self.strength.crease[max(self.y - 1, 0) : self.y + 2, max(self.x - 1, 0) : self.x + 2]
+            strong = np.sort(beside[beside > 0])[::-1]
             count = int(np.count_nonzero(strong >= np.float32(least)))
             if count >= _COMPANY or self.jump > 0:
                 text = "No pixel of its line reaches the thresholds, only hysteresis times these."
@@ -243,18 +243,27 @@ class _Case:
             lower = {"creaseThreshold": _below(float(strong[_COMPANY - 1]))} if len(strong) >= _COMPANY else {}
             text = f"A stray crease: of the nine pixels around it {count} reach creaseThreshold, {_COMPANY} are needed."
             return _Verdict("stray", text, count, _COMPANY, (lower, {**lower, **_EVERYTHING}))
-        _, labels = cv2.connectedComponents(lines)
-        line = labels == labels[at]
-        length = 1 + max(int(np.ptp(places)) for places in np.nonzero(line))
+        length = self._length(self._with_pixel(lines))
         if length < own.minLength:
             text, shorter = f"Its line is {length} pixels long; minLength is {own.minLength}.", {"minLength": length}
             return _Verdict("line", text, length, own.minLength, (shorter, {**shorter, "lineSignificance": 0.0}))
+        line = self._with_pixel(around(self.frame, _widened, lines)) & (lines > 0)
         squares = np.square(self.strength.significance[line], dtype=np.float64)
-        whole = float(np.sqrt(squares.mean() * length / _USUAL_LENGTH))
+        whole = float(np.sqrt(squares.mean() * self._length(line) / _USUAL_LENGTH))
         if whole < own.lineSignificance:
             text = f"The significance of its line is {whole:.3g}; lineSignificance is {own.lineSignificance:g}."
             return _Verdict("line", text, whole, own.lineSignificance, ({"lineSignificance": _below(whole)},))
         return _Verdict("line", "Its line does not stand out of the others.", trials=({"dynamic": False},))
+
+    def _with_pixel(self, lines: np.ndarray) -> np.ndarray:
+        """The pixels of the line that holds the pixel asked for."""
+        labels = around(self.frame, lambda lines, wrap: components(lines > 0, wrap)[1], lines)
+        return labels == labels[self.y, self.x]
+
+    def _length(self, line: np.ndarray) -> int:
+        """The longer side of its bounding box, and all around the number of its places."""
+        places = enumerate(np.nonzero(line))
+        return max(len(np.unique(at)) if axis == self.frame.seam else 1 + int(np.ptp(at)) for axis, at in places)
 
     def _of_cut(self, lines: tuple[ScanLine, ...]) -> _Verdict:
         """Of a pixel of which no candidate is left: the cut beside it that came farthest."""
@@ -275,7 +284,8 @@ class _Case:
             if not change:
                 continue
             strength = self.strength if params == self.params else measure_strength(self.frame, params)
-            if bool(thinEdges(select_strength(strength, selection))[self.y, self.x]) != self.edge:
+            thin = thin_lines(self.frame, selected(self.frame, strength, selection))
+            if bool(thin[self.y, self.x]) != self.edge:
                 return change
         return {}
 
@@ -300,6 +310,12 @@ def _for_cut(cut: Cut) -> Iterator[dict[str, Any]]:
             yield {"minSignificance": least}
             yield {"minSignificance": least, "lineSignificance": 0.0}
             yield {"minSignificance": least, **lower, **_EVERYTHING}
+
+
+def _widened(lines: np.ndarray, wrap: bool) -> np.ndarray:
+    """Each pixel with the eight around it."""
+    framed = np.pad(lines, ((0, 0), (1, 1)), mode="wrap" if wrap else "constant")
+    return cv2.dilate(framed, np.ones((3, 3), np.uint8))[:, 1:-1]
 
 
 def _with(options: Any, change: Mapping[str, Any]) -> Any:

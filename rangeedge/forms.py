@@ -69,7 +69,8 @@ def _of_records(records: np.ndarray) -> np.ndarray:
     if records.ndim != 2 or 1 in records.shape:
         raise fail(
             "src",
-            "records of shape (H, W): scan lines need the rows and columns of the sensor",
+            "records of shape (H, W): scan lines need the rows and columns of the sensor; reshape those of an"
+            " organized cloud by its height and width",
             f"records of shape {records.shape}",
             cv2.Error.StsBadSize,
         )

@@ -108,7 +108,7 @@ class ScanLineParams(Options):
     --------
     >>> from rangeedge import FIT_INTERP, ScanLineParams
     >>> ScanLineParams().maxShift
-    4.0
+    8.0
     >>> ScanLineParams.paper().fit == FIT_INTERP
     True
     >>> ScanLineParams(maxGap=4, noise=0.002)
@@ -212,7 +212,7 @@ class ScanLineParams(Options):
         kept="tuple[tuple[float, float], ...] | None",
         read=_parse.invalid_values,
         metavar="V|LOW:HIGH[,...]",
-        flagged="values as stored, and ranges of them, that are no data: --invalid=-9999 or 0,8000:inf",
+        flagged="values as stored, and ranges of them, that are no data: --invalid=-9999 or 0,8000:inf, or none",
     )
     origin: Sequence[float] | None = option(
         None,
@@ -280,7 +280,7 @@ class ScanLineParams(Options):
         kernel="normals",
     )
     maxShift: float = option(
-        4.0,
+        8.0,
         _real(0),
         "float",
         "How far the adapted edge position may lie from the cut (paper, 4.2, Fig. 5); 0 keeps the cut.",
@@ -378,11 +378,11 @@ class Selection(Options):
         unit="pixels",
     )
     lineSignificance: float = option(
-        14.0,
+        19.0,
         _real(0),
         "float",
-        "Least significance of a connected line, >= 0: the root mean square of its pixels' significance, times the"
-        " root of its length in units of 10 pixels; 0 keeps all lines.",
+        "Least significance of a line, >= 0: the root mean square of its pixels' significance, times the root of its"
+        " length in units of 10 pixels. It may have gaps of two pixels. 0 keeps all lines.",
     )
     dynamic: bool = option(
         False,

@@ -21,6 +21,7 @@ _FORMATS = {  # of depth cameras
     *((480, 360), (512, 424), (512, 512), (640, 360), (640, 400), (640, 480), (640, 576), (848, 480), (960, 540)),
     *((1024, 768), (1024, 1024), (1280, 720), (1280, 800), (1280, 960), (1280, 1024), (1920, 1080), (1944, 1200)),
 }
+_TURNS = {(width, height) for width in (512, 1024, 2048) for height in (16, 32, 64, 128)}  # of scanners that turn
 _SEVERAL = 16  # pixels of one value, that may stand for no data
 _HOLES = 0.01  # share of the pixels, that a camera does not see
 _FARTHER = 5.0  # times all others, that a value stands for no data
@@ -112,13 +113,16 @@ def _warn_of_form(src: np.ndarray, frame: Frame, plain: bool) -> None:
     if src.dtype.kind in "iu" and src.dtype.itemsize == 1:
         warn("`src` has 8 bits, too coarse for edges: pass the depths as the sensor gave them, in 16 bits or floats")
     size = (src.shape[1], src.shape[0])
-    if not plain or (size not in _FORMATS and size[::-1] not in _FORMATS):
+    turns = size in _TURNS
+    if not plain or not (turns or size in _FORMATS or size[::-1] in _FORMATS):
         return
     holes = np.count_nonzero(frame.valid) < (1 - _HOLES) * src.size
     if src.dtype == np.uint16 or (src.dtype.kind == "f" and holes and 0 < _positive_extent(frame) < _FLAT * min(size)):
+        what = "range image of a scanner that turns" if turns else "image of a depth camera"
+        way_out = "make points of it by sweepToPoints" if turns else "give K"
         warn(
-            f"`src` looks like the image of a depth camera ({size[0]} x {size[1]}, {src.dtype}), but K is not given:"
-            " angles and noise are those of a grid with a spacing of 1; give K, or pixelSize where it is a grid"
+            f"`src` looks like the {what} ({size[0]} x {size[1]}, {src.dtype}), but its geometry is not given: angles"
+            f" and noise are those of a grid with a spacing of 1; {way_out}, or give pixelSize where it is a grid"
         )
 
 

@@ -506,3 +506,20 @@ def test_lines_takes_the_options_of_linking(image, tmp_path, capsys):
     assert json.loads((tmp_path / "a" / "report.json").read_text())["segments"] == 0
     assert run(capsys, "lines", image, *CAMERA, "--bridge", "-1", "--out", tmp_path / "b")[0] == 2
     assert not (tmp_path / "b").exists()
+
+
+@pytest.mark.filterwarnings("default")
+def test_warnings_speak_of_flags(tmp_path, capsys):
+    depth = np.where(np.indices((96, 128))[1] < 64, 1500, 2000).astype(np.uint16)
+    depth[10:20, 10:20] = 65535
+    cv2.imwrite(str(tmp_path / "depth.png"), depth)
+    argv = ["detect", str(tmp_path / "depth.png"), "--out", str(tmp_path / "out"), "-K", "140,140,63.5,47.5"]
+    assert main([*argv, "--jump-threshold", "90"]) == 0
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0].startswith("rangeedge: warning: `src` is 65535 at 100 of 12288 pixels")
+    assert "say --invalid=65535 if these have no data, --invalid=none if they have" in lines[0]
+    assert lines[1].startswith("rangeedge: warning: --jump-threshold=90 exceeds")
+    assert len(lines) == 2
+    assert main([*argv, "--invalid", "none"]) == 0
+    assert main([*argv, "--invalid", "0,65535"]) == 0
+    assert capsys.readouterr().err == ""

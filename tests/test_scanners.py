@@ -353,3 +353,40 @@ def test_contours_are_closed_all_around():
     assert (closed | ~broken).all()
     assert near(closed & ~broken, borders(faces)) > 0.95
     assert (closed & ~broken).sum() > 0.7 * (whole & ~broken).sum()
+
+
+def test_noise_is_smoothed_all_around():
+    rays, ranges, _ = sweep(64, 22.5, (180, -180))
+    truth = rays * ranges[..., None]
+    points, _ = room(64)
+    cleaned, changed = rangeedge.cleanDepth(points)
+    off = np.linalg.norm(cleaned - truth, axis=2), np.linalg.norm(points - truth, axis=2)
+    assert off[0].max() < 0.05
+    assert np.sqrt((off[0] ** 2).mean()) < 0.7 * np.sqrt((off[1] ** 2).mean())
+    assert (changed == rangeedge.CLEAN_SMOOTHED).mean() > 0.98
+
+
+def test_pixels_at_the_seam_are_explained():
+    points, _ = room(columns=57)
+    edges = detectEdges(points)
+    for x in (0, 1, COLUMNS - 2, COLUMNS - 1):
+        for y in (10, 30, 50):
+            why = rangeedge.explainPixel(points, x, y)
+            assert why.edge == bool(edges[y, x])
+            assert why.stage != "line"
+
+
+@pytest.mark.parametrize("origin", [None, (4, -7, 1.1)])
+@pytest.mark.parametrize("units", [False, True])
+def test_outlines_all_around_lie_on_their_walls(units, origin):
+    points, faces = room(columns=57)
+    if origin:
+        points = points + origin
+    labels = (faces + 1).astype(np.int32)
+    tolerance = 0.05 if units else 1.0
+    outlines = rangeedge.regionBoundaries(labels, points, tolerance, units=units, origin=origin)
+    assert {outline.label for outline in outlines} == set(range(1, 7))
+    for outline in outlines:
+        axis, place = WALLS[outline.label - 1]
+        off = outline.outline["point"][:, axis] - place - (origin or (0, 0, 0))[axis]
+        assert np.abs(off).max() < 0.01

@@ -36,7 +36,7 @@ from .results import (
     region_files,
     write_folder,
 )
-from .understood import sentence
+from .understood import sentence, told_warnings
 
 _INPUT = """A range image: 16-bit or float PNG, TIFF, PGM, EXR, PFM, NPY, NPZ, organized PCD or PLY,
 or a file of an ABW, Perceptron or Technical Arts scanner. With a pinhole camera give -K; without, the image is
@@ -85,7 +85,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = _parser().parse_args(argv)
     run: Callable[[argparse.Namespace], int] = args.run
     try:
-        code = run(args)
+        with told_warnings(_flag):
+            code = run(args)
         sys.stdout.flush()
         return code
     except error as problem:

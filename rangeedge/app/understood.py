@@ -1,13 +1,19 @@
-"""What the command line has understood of an image: unit, depths, spacing, noise, and the thresholds in effect."""
+"""What the command line says of an image: unit, depths, spacing, noise, thresholds, and what hardly fits."""
 
 from __future__ import annotations
 
+import re
+import sys
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from ..frame import Frame
-from ..options import ScanLineParams, Selection
+from ..options import DETECTION, ScanLineParams, Selection
+from ..plausible import RangeEdgeWarning
 
 
 def understood(frame: Frame, params: ScanLineParams, selection: Selection, src: np.ndarray) -> dict[str, Any]:
@@ -70,3 +76,20 @@ def _noise(frame: Frame, depth: float | None) -> float | None:
     if isinstance(frame.noise, np.ndarray):
         return float(np.median(frame.noise[frame.valid.view(bool)])) if frame.valid.any() else None
     return None if depth is None else float(frame.noise(abs(depth)))
+
+
+@contextmanager
+def told_warnings(flag: Callable[[str], str]) -> Iterator[None]:
+    """Warnings of the package as lines of the command line, in whose words `flag` names the options."""
+    with warnings.catch_warnings():
+        other = warnings.showwarning
+
+        def tell(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            if not issubclass(category, RangeEdgeWarning):
+                return other(message, category, *where)
+            text = str(message).replace("invalid=()", "invalid=none")
+            text = re.sub(rf"\b({'|'.join(DETECTION)})\b", lambda name: flag(name[0]), text)
+            print(f"rangeedge: warning: {text}", file=sys.stderr)
+
+        warnings.showwarning = tell
+        yield
