@@ -535,16 +535,16 @@ class Accessors:
     def getLineSignificance(self) -> float:
         """getLineSignificance() -> retval
 
-        Least significance of a connected line, >= 0: the root mean square of its pixels' significance, times the root
-        of its length in units of 10 pixels; 0 keeps all lines.
+        Least significance of a line, >= 0: the root mean square of its pixels' significance, times the root of its
+        length in units of 10 pixels. It may have gaps of two pixels. 0 keeps all lines.
         """
         return self._selection.lineSignificance
 
     def setLineSignificance(self, lineSignificance: float, /) -> None:
         """setLineSignificance(lineSignificance) -> None
 
-        Least significance of a connected line, >= 0: the root mean square of its pixels' significance, times the root
-        of its length in units of 10 pixels; 0 keeps all lines.
+        Least significance of a line, >= 0: the root mean square of its pixels' significance, times the root of its
+        length in units of 10 pixels. It may have gaps of two pixels. 0 keeps all lines.
         """
         self._set("lineSignificance", lineSignificance)
 

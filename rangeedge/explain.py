@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import cv2
 import numpy as np
 
 from ._check import fail, integer
@@ -242,18 +243,27 @@ class _Case:
             lower = {"creaseThreshold": _below(float(strong[_COMPANY - 1]))} if len(strong) >= _COMPANY else {}
             text = f"A stray crease: of the nine pixels around it {count} reach creaseThreshold, {_COMPANY} are needed."
             return _Verdict("stray", text, count, _COMPANY, (lower, {**lower, **_EVERYTHING}))
-        labels = around(self.frame, lambda lines, wrap: components(lines > 0, wrap)[1], lines)
-        line = labels == labels[at]
-        length = max(len(np.unique(places)) for places in np.nonzero(line))
+        length = self._length(self._with_pixel(lines))
         if length < own.minLength:
             text, shorter = f"Its line is {length} pixels long; minLength is {own.minLength}.", {"minLength": length}
             return _Verdict("line", text, length, own.minLength, (shorter, {**shorter, "lineSignificance": 0.0}))
+        line = self._with_pixel(around(self.frame, _widened, lines)) & (lines > 0)
         squares = np.square(self.strength.significance[line], dtype=np.float64)
-        whole = float(np.sqrt(squares.mean() * length / _USUAL_LENGTH))
+        whole = float(np.sqrt(squares.mean() * self._length(line) / _USUAL_LENGTH))
         if whole < own.lineSignificance:
             text = f"The significance of its line is {whole:.3g}; lineSignificance is {own.lineSignificance:g}."
             return _Verdict("line", text, whole, own.lineSignificance, ({"lineSignificance": _below(whole)},))
         return _Verdict("line", "Its line does not stand out of the others.", trials=({"dynamic": False},))
+
+    def _with_pixel(self, lines: np.ndarray) -> np.ndarray:
+        """The pixels of the line that holds the pixel asked for."""
+        labels = around(self.frame, lambda lines, wrap: components(lines > 0, wrap)[1], lines)
+        return labels == labels[self.y, self.x]
+
+    def _length(self, line: np.ndarray) -> int:
+        """The longer side of its bounding box, and all around the number of its places."""
+        places = enumerate(np.nonzero(line))
+        return max(len(np.unique(at)) if axis == self.frame.seam else 1 + int(np.ptp(at)) for axis, at in places)
 
     def _of_cut(self, lines: tuple[ScanLine, ...]) -> _Verdict:
         """Of a pixel of which no candidate is left: the cut beside it that came farthest."""
@@ -300,6 +310,12 @@ def _for_cut(cut: Cut) -> Iterator[dict[str, Any]]:
             yield {"minSignificance": least}
             yield {"minSignificance": least, "lineSignificance": 0.0}
             yield {"minSignificance": least, **lower, **_EVERYTHING}
+
+
+def _widened(lines: np.ndarray, wrap: bool) -> np.ndarray:
+    """Each pixel with the eight around it."""
+    framed = np.pad(lines, ((0, 0), (1, 1)), mode="wrap" if wrap else "constant")
+    return cv2.dilate(framed, np.ones((3, 3), np.uint8))[:, 1:-1]
 
 
 def _with(options: Any, change: Mapping[str, Any]) -> Any:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class FrameResult(NamedTuple):
     """What became of one frame: what the function returned, or the error that stopped it."""
 
-    index: int
+    frame: int
     value: Any
     error: str
     seconds: float
@@ -63,8 +63,8 @@ def mapFrames(
     Returns
     -------
     results : iterator of FrameResult
-        ``index``, ``value``, ``error`` (empty where all went well) and ``seconds``; in the order of the frames, each as
-        soon as it and those before it are done.
+        ``frame`` (its number), ``value``, ``error`` (empty where all went well) and ``seconds``; in the order of the
+        frames, each as soon as it and those before it are done.
 
     Raises
     ------
@@ -85,7 +85,7 @@ def mapFrames(
     >>> stack = np.full((3, 48, 64), 2.0)
     >>> stack[:, 12:36, 16:48] = 1.5
     >>> results = mapFrames(stack, functools.partial(detectEdges, noise=0.001, pixelSize=0.01))
-    >>> [(result.index, int(np.count_nonzero(result.value))) for result in results]
+    >>> [(result.frame, int(np.count_nonzero(result.value))) for result in results]
     [(0, 104), (1, 104), (2, 104)]
     """
     if not callable(function):

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .frame import Frame
 
 _WIDEST = np.deg2rad(150)  # image that needs no sectors
+_MOST = np.deg2rad(720)  # beyond which rays are in no order at all
 _SECTOR = np.deg2rad(90)
 _MARGIN = np.deg2rad(30)  # that a sector overlaps its neighbours, so that surfaces go on beyond its end
 _CLOSED = np.deg2rad(300)  # from which on first and last line may be neighbours
@@ -74,7 +75,7 @@ def turn_of(samples: np.ndarray) -> Turn | None:
     steps = [_steps(rays, axis) for axis in (0, 1)]
     axis = int(steps[1].sum() > steps[0].sum())
     extent = float(steps[axis].sum())
-    return Turn(axis, extent, _is_closed(rays, axis, steps[axis])) if extent > _WIDEST else None
+    return Turn(axis, extent, _is_closed(rays, axis, steps[axis])) if _WIDEST < extent <= _MOST else None
 
 
 def sectors_of(frame: Frame) -> list[Sector]:
@@ -121,7 +122,7 @@ def _is_closed(rays: np.ndarray, axis: int, steps: np.ndarray) -> bool:
 def _divided(frame: Frame, turn: Turn) -> Iterator[Sector]:
     axis, extent, closed = turn
     count = frame.shape[axis]
-    parts = int(np.ceil(extent / _SECTOR))
+    parts = min(int(np.ceil(extent / _SECTOR)), count)
     margin = int(count * _MARGIN / extent)
     bounds = np.linspace(0, count, parts + 1).astype(int)
     for start, stop in zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True):

@@ -349,7 +349,7 @@ def _connected_to(strong: np.ndarray, candidates: np.ndarray, wrap: bool) -> np.
 def _lines(
     edges: np.ndarray, minLength: int, significance: np.ndarray | None, lineSignificance: float, wrap: bool
 ) -> np.ndarray:
-    """The 8-connected components that are long and significant."""
+    """The lines that are significant, but for short pieces."""
     kept = np.empty(edges.shape, np.uint8)
     _core.keep_lines(edges.view(np.uint8), wrap, minLength, significance, lineSignificance, kept)
     return kept.view(bool)

@@ -29,17 +29,29 @@ def built_in_scene():
     return scan.src, scan.geometry
 
 
+def edge_lengths(pieces):
+    """Lengths of parallel edges. Parallel edges of a box share no corner: segments that do are pieces of one edge."""
+    edges = []  # corners and length
+    for piece in pieces:
+        corners, length = set(piece["vertices"].tolist()), piece["length"]
+        for edge in [edge for edge in edges if edge[0] & corners]:
+            edges.remove(edge)
+            corners, length = corners | edge[0], length + edge[1]
+        edges.append((corners, length))
+    return np.array([length for _, length in edges])
+
+
 def dimensions(segments):
-    """Mean length, its deviation and the number of edges along each direction, of edges between two corners."""
+    """Median length, its deviation and the number of edges along each direction, of edges between two corners."""
     whole = segments[(segments["vertices"] >= 0).all(axis=1)]
     left = np.ones(len(whole), bool)
     found = []
     while left.any():
         first = whole[left][whole[left]["endDeviation"].argmin()]
         alike = left & (np.abs(whole["direction"] @ first["direction"]) > PARALLEL)
-        lengths = whole["length"][alike]
+        lengths = edge_lengths(whole[alike])
         deviation = lengths.std(ddof=1) / np.sqrt(len(lengths)) if len(lengths) > 1 else np.nan
-        found.append((lengths.mean(), deviation, len(lengths)))
+        found.append((np.median(lengths), deviation, len(lengths)))
         left &= ~alike
     return sorted(found)
 

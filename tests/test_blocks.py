@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 
-from rangeedge import detectEdges, detectEdgesWithStrength, distanceTransform, error, imwriteRange, segmentRegions
+from rangeedge import (
+    detectEdges,
+    detectEdgesWithStrength,
+    distanceTransform,
+    error,
+    imreadRange,
+    imwriteRange,
+    segmentRegions,
+)
 from rangeedge.app.cli import main
 from rangeedge.batch import runBlocks
 from rangeedge.io.tiff import images_of_tiff, read_page, read_window
@@ -124,6 +132,25 @@ class TestRuns:
         assert (found["jump"] != strength.jump).mean() < 0.01
         assert np.array_equal(found["distance"], distanceTransform(found["edges"]))
 
+    def test_geotiffs_in_and_out(self, zarr, tmp_path):
+        tifffile = pytest.importorskip("tifffile")
+        tags = [(33550, 12, 3, (0.5, 0.5, 0.0)), (33922, 12, 6, (0, 0, 0, 1000.0, 2000.0, 0))]
+        tags += [(34735, 3, 8, (1, 1, 0, 1, 1024, 0, 1, 1)), (34737, 2, 0, "plane|")]
+        tifffile.imwrite(tmp_path / "a.tif", terrain(), extratags=[(*tag, True) for tag in tags])
+        out = tmp_path / "out"
+        argv = ["batch", str(tmp_path / "a.tif"), "--blocks", "128", "--overlap", "48", "--noise", "0.02"]
+        assert main([*argv, "--out", str(out)]) == 0
+        written = {"edges.tif", "jump.tif", "crease.tif", "kind.tif", "significance.tif", "distance.tif"}
+        assert {file.name for file in out.iterdir() if file.suffix == ".tif"} == written
+        store = zarr.open_group(str(out / "blocks.zarr"), mode="r")
+        for name in written:
+            assert np.array_equal(tifffile.imread(out / name), store[name.removesuffix(".tif")][:])
+        image, source = imreadRange(out / "distance.tif"), imreadRange(tmp_path / "a.tif")
+        assert np.array_equal(image.georeference, source.georeference)
+        assert image.geometry == source.geometry
+        with tifffile.TiffFile(out / "edges.tif") as file:
+            assert file.pages[0].tags[34737].value == "plane|"
+
     def test_regions_are_joined(self, zarr, tmp_path):
         np.save(tmp_path / "a.npy", terrain())
         out = tmp_path / "out.zarr"
@@ -205,8 +232,6 @@ def test_bad_arguments(tmp_path, more, message):
     np.save(tmp_path / "a.npy", terrain())
     with pytest.raises(error, match=f"runBlocks: {message}"):
         runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", **more)
-    with pytest.raises(error, match="`out` must be a Zarr store"):
-        runBlocks(tmp_path / "a.npy", tmp_path / "out")
 
 
 def test_what_is_no_large_image(zarr, tmp_path):

@@ -19,7 +19,9 @@ def run(*command):
 @pytest.mark.skipif(not shutil.which("cmake"), reason="CMake is not installed")
 def test_a_program_finds_edges_with_the_installed_core(tmp_path):
     core, prefix, program = tmp_path / "core", tmp_path / "prefix", tmp_path / "program"
-    run("cmake", "-S", ROOT / "rangeedge/core", "-B", core, "-DRANGEEDGE_PYTHON=OFF", f"-DCMAKE_INSTALL_PREFIX={prefix}")
+    run(
+        "cmake", "-S", ROOT / "rangeedge/core", "-B", core, "-DRANGEEDGE_PYTHON=OFF", f"-DCMAKE_INSTALL_PREFIX={prefix}"
+    )
     run("cmake", "--build", core, "--parallel", 2)
     run("cmake", "--install", core)
     run("cmake", "-S", ROOT / "samples/cpp", "-B", program, f"-DCMAKE_PREFIX_PATH={prefix}")

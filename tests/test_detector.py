@@ -160,7 +160,7 @@ def test_stray_crease_pixels_do_not_count_nor_jumps_on_the_farther_side():
     crease[1, 3:5] = 40
     jump[8] = jump[7] = 1
     kind[7], kind[8] = EDGE_OCCLUDING | EDGE_JUMP, EDGE_OCCLUDED | EDGE_JUMP
-    edges = selectEdges(EdgeStrength(jump, crease, kind, np.full((9, 9), 20.0, np.float32)), minLength=1)
+    edges = selectEdges(EdgeStrength(jump, crease, kind, np.full((9, 9), 30.0, np.float32)), minLength=1)
     expected = np.zeros((9, 9), np.uint8)
     expected[4:6, 1:8] = expected[7] = 255
     np.testing.assert_array_equal(edges, expected)
@@ -497,7 +497,7 @@ def test_a_file_of_version_0_1_is_read(tmp_path, detector):
         "   mergeSignificance: 5.\n   minSignificance: 12.\ncomplete: 1\n"
     )
     detector.load(path)
-    old = {"eps": 0.25, "noise": NoiseModel(a=0.5), "heightMap": True, "maxGap": 2}
+    old = {"eps": 0.25, "noise": NoiseModel(a=0.5), "heightMap": True, "maxShift": 4.0, "maxGap": 2}
     old |= {"mergeSignificance": 5.0, "minSignificance": 12.0}
     same(get_all(detector), {**DEFAULTS, **old})
     path.write_text(path.read_text().removesuffix("complete: 1\n"))

@@ -1,5 +1,6 @@
 """The explorer: what it computes, and the page in a real browser."""
 
+import os
 import shutil
 import socket
 import subprocess
@@ -109,7 +110,8 @@ def page(tmp_path):
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     command = [sys.executable, "-m", "rangeedge", "explore", "--no-browser", "--port", str(port)]
-    server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    environment = {name: value for name, value in os.environ.items() if "PYTEST" not in name}  # which NiceGUI minds
+    server = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM
     for flag in [*FLAGS.split(), f"--user-data-dir={tmp_path / 'profile'}"]:
@@ -177,17 +179,25 @@ def test_page(page, tmp_path):
     assert all(view.get_attribute("src").startswith("data:image/png") for view in views)
 
     # A slider changes the edges, the program that the page shows, and nothing else.
-    slider = driver.find_element("css selector", "#creaseThreshold [role=slider], #creaseThreshold")
-    status = page.after(lambda: slider.send_keys(*[Keys.ARROW_RIGHT] * 40))
+    slider = driver.find_element("id", "creaseThreshold")
+    high = slider.size["width"] * 0.45  # from its middle
+    status = page.after(ActionChains(driver).move_to_element_with_offset(slider, high, 0).click().perform)
     _wait(lambda: "creaseThreshold" in page.text("program"))
     assert edges_of(page.status()) < edges_of(first)
     assert status.endswith(" ms")
+
+    driver.save_screenshot(str(tmp_path / "explorer.png"))
 
     # A click asks why.
     image = driver.find_element("css selector", "#view-edges img, #view-edges")
     ActionChains(driver).move_to_element(image).click().perform()
     _wait(lambda: page.text("words").startswith("Pixel (3"))
     assert driver.find_elements("id", "why")
+
+    time.sleep(0.5)  # that the dialog takes to open
+    driver.save_screenshot(str(tmp_path / "why.png"))
+    ActionChains(driver).send_keys(Keys.ESCAPE).perform()
+    _wait(lambda: not driver.find_elements("css selector", ".q-dialog__backdrop"))
 
     # The wheel zooms all views together.
     ActionChains(driver).scroll_from_origin(_origin(image), 0, -300).perform()
@@ -200,7 +210,8 @@ def test_page(page, tmp_path):
     upload.send_keys(str(tmp_path / "notes.txt"))
     _wait(lambda: "notes.txt" in page.text("problem"))
     assert page.text("title") == "built-in scene"
-    cv2.imwrite(str(tmp_path / "step.png"), np.where(np.arange(200) < 90, 900, 1200) * np.ones((150, 1), np.uint16))
+    step = np.where(np.arange(200) < 90, 900, 1200) * np.ones((150, 1))
+    cv2.imwrite(str(tmp_path / "step.png"), step.astype(np.uint16))
     (upload,) = driver.find_elements("css selector", "input[type=file]")
     upload.send_keys(str(tmp_path / "step.png"))
     _wait(lambda: page.status().startswith("200 x 150, "))

@@ -254,7 +254,7 @@ def test_garbled_frames_among_good_ones(tmp_path):
 
 def test_frames_of_functions_in_order_and_with_their_errors(recording):
     results = list(mapFrames([*np.load(recording)[:3], "missing.png"], area, jobs=2))
-    assert [(result.index, result.value) for result in results] == [(0, 4800), (1, 4800), (2, 4800), (3, None)]
+    assert [(result.frame, result.value) for result in results] == [(0, 4800), (1, 4800), (2, 4800), (3, None)]
     assert "missing.png" in results[3].error
     given = list(mapFrames([rangeedge.RangeImage(np.zeros((3, 4)), {"pixelSize": 2.0})], spaced))
     assert given[0].value == 2.0

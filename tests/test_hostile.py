@@ -1,5 +1,6 @@
 """Arguments and surroundings that nobody means: all that comes of them is `rangeedge.error`."""
 
+import contextlib
 import os
 import subprocess
 import sys
@@ -164,3 +165,37 @@ def test_commands_whose_output_has_no_room(command, tmp_path):
     assert run.stderr.startswith("rangeedge: error: cannot write")
     assert len(run.stderr.splitlines()) == 1
     assert (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("shape", [(1, 2), (3, 5), (24, 33), (64, 80)])
+@pytest.mark.parametrize("decades", [0, 300])
+def test_points_in_no_order_at_all(shape, decades):
+    rng = np.random.default_rng(shape[0])
+    points = rng.normal(size=(*shape, 3)) * 10.0 ** rng.integers(-decades, decades + 1, (*shape, 3))
+    for function in (rangeedge.detectEdges, rangeedge.segmentRegions):
+        with contextlib.suppress(rangeedge.error):
+            assert function(points).shape == shape
+
+
+@pytest.mark.skipif(not hasattr(os, "O_TMPFILE"), reason="there are no files without a name")
+@pytest.mark.parametrize("existing", [False, True])
+def test_a_program_killed_while_it_writes_leaves_nothing(existing, tmp_path, monkeypatch):
+    """Whatever is written up to then has no name yet."""
+    from rangeedge.app import results
+    from rangeedge.io import atomic
+
+    seen = []
+
+    def look(folder, data):
+        file = atomic.nameless(folder, data)
+        seen.append(sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*")))
+        return file
+
+    if existing:
+        results.write_folder(tmp_path / "out", {"old.txt": b"old"})
+    before = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*"))
+    monkeypatch.setattr(results, "nameless", look)
+    results.write_folder(tmp_path / "out", {"a.txt": b"a" * 10**6, "report.json": b"{}"})
+    assert seen == [before, before]
+    assert (tmp_path / "out/a.txt").read_bytes() == b"a" * 10**6
+    assert not [path for path in tmp_path.rglob("*") if path.suffix == ".tmp"]

@@ -6,6 +6,7 @@ from glob import glob
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 
 from rangeedge.app.cli import main
@@ -25,10 +26,10 @@ def commands():
 
 def test_readme_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert [argv[0] for argv in commands()] == ["demo", "detect", "segment", "lines", "batch"]
+    assert [argv[0] for argv in commands()] == ["demo", "detect", "explain", "segment", "lines", "batch"]
     for argv in commands():
         assert main([name for word in argv for name in (glob(word) if "*" in word else [word])]) == 0
-        assert (Path(argv[-1])).is_dir()
+        assert Path(argv[-1]).exists()
     capsys.readouterr()
     (program,) = blocks("python")
     exec(program, {})
@@ -41,3 +42,12 @@ def test_readme_runs(tmp_path, monkeypatch, capsys):
 )
 def test_files_of_the_readme_exist(name):
     assert (README.parent / name).exists()
+
+
+def test_picture_of_the_readme_has_a_true_key():
+    """Each colour of edges is in the key, as it is drawn, and tells apart from the others."""
+    from rangeedge.draw.palette import KINDS
+
+    key = cv2.imread(str(README.parent / ".github" / "overview.jpg"))[-28:].reshape(-1, 3).astype(int)
+    for _, colour, text in KINDS:
+        assert np.count_nonzero(np.abs(key - colour).max(axis=1) < 6) > 100, text

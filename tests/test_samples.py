@@ -15,6 +15,7 @@ from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
 
 SAMPLES = Path(__file__).resolve().parents[1] / "samples"
 PICTURES = {
+    "overview": ["overview.jpg"],
     "edges": ["edges.png"],
     "explain": ["explain.png"],
     "thinning": ["thinning.png"],

@@ -71,6 +71,35 @@ def test_a_line_is_as_significant_as_its_pixels_and_the_more_so_the_longer_it_is
         assert np.array_equal(selectEdges(strength, 1.0, lineSignificance=least) > 0, expected)
 
 
+def test_a_line_may_have_gaps_of_two_pixels():
+    # Pieces of 9 pixels, each of a significance of 5, with 1, 2 and 3 pixels between them, along a row and a diagonal.
+    def kept(gap, down, least):
+        jump = np.zeros((30, 30), np.float32)
+        for k in (*range(9), *range(9 + gap, 18 + gap)):
+            jump[5 + k * down, 5 + k] = 1
+        kind = np.where(jump > 0, EDGE_JUMP | EDGE_OCCLUDING, 0).astype(np.uint8)
+        strength = EdgeStrength(jump, np.zeros_like(jump), kind, jump * 5)
+        edges = selectEdges(strength, 0.5, lineSignificance=least) > 0
+        assert np.array_equal(edges, jump > 0) or not edges.any()
+        return edges.any()
+
+    for down in (0, 1):
+        for gap in (1, 2):
+            assert kept(gap, down, 5 * np.sqrt((18 + gap) / 10) - 0.01)
+            assert not kept(gap, down, 5 * np.sqrt((18 + gap) / 10) + 0.01)
+        assert kept(3, down, 5 * np.sqrt(9 / 10) - 0.01)
+        assert not kept(3, down, 5 * np.sqrt(9 / 10) + 0.01)
+
+
+def test_a_piece_of_a_line_has_the_least_length_itself():
+    jump = np.zeros((9, 40), np.float32)
+    jump[4, 5:20] = jump[4, 22:25] = 1
+    kind = np.where(jump > 0, EDGE_JUMP | EDGE_OCCLUDING, 0).astype(np.uint8)
+    strength = EdgeStrength(jump, np.zeros_like(jump), kind, jump * 30)
+    for least, pixels in ((3, 18), (4, 15)):
+        assert (selectEdges(strength, 0.5, minLength=least) > 0).sum() == pixels
+
+
 def test_the_detector_leaves_lines_out_that_are_not_significant():
     z = 1 + 0.002 * np.abs(U - 29.6) * np.ones((50, 1)) + np.random.default_rng(2).normal(0, 0.004, (50, 60))
     options = dict(noise=0.004, pixelSize=0.002)

@@ -50,7 +50,8 @@ def add_batch_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=None,
         metavar="N",
-        help="do one INPUT, larger than memory (TIFF; NPY or Zarr of shape (H, W)), in blocks of N pixels into a STORE",
+        help="do one INPUT, larger than memory (TIFF; NPY or Zarr of shape (H, W)), in blocks of N pixels; in DIR they"
+        " become GeoTIFFs",
     )
     own.add_argument("--overlap", type=int, default=256, metavar="N", help="pixels around a block (default: 256)")
     own.add_argument("--topic", action="append", default=[], dest="topics", help="of a bag (default: all with depths)")

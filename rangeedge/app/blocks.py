@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ..noise import estimateNoise
 from ..options import DETECTION, MEASURED, Growing, ScanLineParams, Selection
 from ..recording import FrameSource
 from ..recording.blocks import Grid, clearance, inside, joined, matches
-from ..recording.large import LargeImage, open_large, window_source
+from ..recording.large import LargeImage, open_large, window_source, write_geotiff
 from ..recording.manifest import Manifest, read_lines
 from ..recording.source import extra
 from ..recording.stores import Outputs, open_arrays, packed, prepare_arrays, write_file, write_region
@@ -60,7 +60,8 @@ def runBlocks(
         A TIFF of any size, from which windows are read, with its pixel size and its value of no data; (H, W) NPY or
         Zarr.
     out : path
-        A Zarr store; a name that ends with ``.zarr``.
+        A Zarr store, whose name ends with ``.zarr``; or a folder: with the store ``blocks.zarr``, and in the end a
+        GeoTIFF of each array, with the georeference of the image.
     task : {"detect", "segment"}
         ``detect`` writes edges, jump, crease, kind, significance, and the distance to the nearest edge; ``segment``
         writes labels, and labels of each block by itself, parts.
@@ -75,7 +76,7 @@ def runBlocks(
     Returns
     -------
     items : iterator of BatchItem
-        One a block and pass: edges first, then distances; parts first, then labels.
+        One a block and step, edges first, then distances, or parts first, then labels; and one a GeoTIFF.
 
     Raises
     ------
@@ -105,8 +106,8 @@ def runBlocks(
     name, root = file_name(image, "image"), Path(file_name(out, "out"))
     if task not in _PASSES:
         raise fail("task", " or ".join(map(repr, _PASSES)), described(task))
-    if root.suffix != ".zarr":
-        raise fail("out", "a Zarr store, whose name ends with .zarr", repr(str(root)))
+    folder = None if root.suffix == ".zarr" else root
+    root = root if folder is None else root / "blocks.zarr"
     size, overlap, jobs = integer("blockSize", blockSize, 64), integer("overlap", overlap, 0), integer("jobs", jobs, 1)
     force, resume = boolean("force", force), boolean("resume", resume)
     for option in options.keys() - TASKS[task].options.keys():
@@ -119,7 +120,23 @@ def runBlocks(
     first = _manifest(root, _PASSES[task][0])
     if resume and not first.exists():
         raise error(f"there is no {str(first)!r} to resume from")
-    return _passes(task, large, Grid(large.shape, size), root, overlap, options, force, jobs=jobs, client=client)
+    grid = Grid(large.shape, size)
+    items = _passes(task, large, grid, root, overlap, options, force, jobs=jobs, client=client)
+    return items if folder is None else _and_files(items, task, large, grid, root)
+
+
+def _and_files(items: Iterator[BatchItem], task: str, image: LargeImage, grid: Grid, root: Path) -> Iterator[BatchItem]:
+    """The blocks, and when all are done the arrays as files beside the store."""
+    whole = True
+    for item in items:
+        whole &= item.state != "failed"
+        yield item
+    if whole:
+        arrays = open_arrays(root, "r")
+        for name in (name for step in _PASSES[task] for name in _STEPS[step].kinds if name != "parts"):
+            path = root.with_name(f"{name}.tif")
+            write_geotiff(path, arrays[name], image, grid.size)
+            yield BatchItem(image.path, str(path), "written", "")
 
 
 def _manifest(root: Path, step: str) -> Path:
@@ -183,14 +200,11 @@ class _BlockJob(Job):
     """A step on every block; where a camera is given, it is seen from the first pixel of each."""
 
     grid: Grid
-
-    def arrays(self) -> dict[str, str]:
-        """The arrays that the step fills, and their types."""
-        raise NotImplementedError
+    kinds: ClassVar[Mapping[str, str]]  # the arrays that it fills, and their types
 
     def prepare(self, frames: list[FrameSource], fresh: bool) -> None:
         size = min(self.grid.size, max(self.grid.shape))
-        arrays = {name: (kind, self.grid.shape, (size, size)) for name, kind in self.arrays().items()}
+        arrays = {name: (kind, self.grid.shape, (size, size)) for name, kind in self.kinds.items()}
         prepare_arrays(self.out, arrays, fresh)
 
     def write(self, index: int, arrays: dict[str, np.ndarray]) -> Outputs:
@@ -208,8 +222,7 @@ class _BlockJob(Job):
 
 
 class _Edges(_BlockJob):
-    def arrays(self) -> dict[str, str]:
-        return dict(TASKS["detect"].frames)
+    kinds = TASKS["detect"].frames
 
     def __call__(self, task: tuple[int, FrameSource]) -> tuple[Outputs, Counts]:
         index, source = task
@@ -221,8 +234,7 @@ class _Edges(_BlockJob):
 
 
 class _Distances(_BlockJob):
-    def arrays(self) -> dict[str, str]:
-        return {"distance": "f4"}
+    kinds: ClassVar[Mapping[str, str]] = {"distance": "f4"}
 
     def __call__(self, task: tuple[int, FrameSource]) -> tuple[Outputs, Counts]:
         """With as much around the block as it takes to know that no edge beyond is nearer."""
@@ -241,8 +253,7 @@ class _Distances(_BlockJob):
 
 
 class _Parts(_BlockJob):
-    def arrays(self) -> dict[str, str]:
-        return {"parts": "i4"}
+    kinds: ClassVar[Mapping[str, str]] = {"parts": "i4"}
 
     def __call__(self, task: tuple[int, FrameSource]) -> tuple[Outputs, Counts]:
         """Labels of a block by itself, and what it calls the pixels beyond its seams."""
@@ -264,8 +275,7 @@ class _Parts(_BlockJob):
 
 
 class _Labels(_BlockJob):
-    def arrays(self) -> dict[str, str]:
-        return {"labels": "i4"}
+    kinds: ClassVar[Mapping[str, str]] = {"labels": "i4"}
 
     def __call__(self, task: tuple[int, FrameSource]) -> tuple[Outputs, Counts]:
         """The labels of a block as they are called in the whole."""

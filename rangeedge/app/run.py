@@ -58,7 +58,8 @@ class Job:
     def parameters(self, frame: FrameSource) -> dict[str, Any]:
         """All that its results depend on but its pixels."""
         known = RangeImage(np.empty(0), dict(frame.geometry)).withGeometry(**self.options).geometry
-        return plain({**known, **self.told})
+        parameters: dict[str, Any] = plain({**known, **self.told})
+        return parameters
 
     def is_done(self, index: int, frame: FrameSource, lines: Mapping[str, Line]) -> bool:
         """Whether its line in the manifest still holds."""
@@ -93,7 +94,7 @@ def run_frames(
                 continue
             outcome = next(outcomes)
             outputs, counts = outcome.value or ({}, {})
-            line = {
+            line: Line = {
                 "frame": frame.name,
                 "input": frame.path,
                 "part": frame.part,

@@ -2,6 +2,7 @@
 
 import os
 import re
+import shutil
 import tempfile
 from pathlib import Path
 
@@ -36,10 +37,11 @@ class WrittenPictures:
 
     def __call__(self, block, block_vars, gallery_conf):
         shown = []
-        for picture in sorted(PICTURES.glob("*.png"), key=os.path.getmtime):
-            target = next(block_vars["image_path_iterator"])
-            picture.replace(target)
-            shown.append(target)
+        pictures = [*PICTURES.glob("*.png"), *PICTURES.glob("*.jpg")]
+        for picture in sorted(pictures, key=os.path.getmtime):
+            target = Path(next(block_vars["image_path_iterator"])).with_suffix(picture.suffix)
+            shutil.move(picture, target)
+            shown.append(str(target))
         return sphinx_gallery.scrapers.figure_rst(shown, gallery_conf["src_dir"])
 
 

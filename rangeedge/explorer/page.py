@@ -90,7 +90,8 @@ class _Page:
         self.choice = ui.select(list(VIEWS), value=list(_FIRST), multiple=True, label="views", on_change=self._lay_out)
         self.choice.props("use-chips dense id=views").classes("w-full")
         self.grid = ui.element("div").classes("w-full grid grid-cols-2 gap-2")
-        self.reason = ui.column().classes("w-full").props("id=reason")
+        with ui.dialog() as self.dialog, ui.card().classes("max-w-none").style("width: 1300px"):
+            self.reason = ui.column().classes("w-full")
         self._lay_out()
 
     def _controls(self) -> None:
@@ -111,10 +112,12 @@ class _Page:
         self.sliders: dict[str, Any] = {}
         for name, (low, high, step) in SLIDERS.items():
             with ui.row().classes("w-full no-wrap items-center gap-1").tooltip(DETECTION[name].text):
-                ui.label(name).classes("w-36 text-caption")
+                ui.label(name).classes("w-32 flex-none text-caption")
                 slider = ui.slider(min=low, max=high, step=step, value=session.value(name)).props(f"id={name}")
                 slider.on("update:model-value", self._slid(name, slider), throttle=0.1, leading_events=False)
-                ui.label().bind_text_from(slider, "value", lambda v: f"{v:g}").classes("w-10 text-caption")
+                ui.label().bind_text_from(slider, "value", lambda v: f"{v:g}").classes(
+                    "w-10 flex-none text-right text-caption"
+                )
                 self.sliders[name] = slider
         for name in SWITCHES:
             switch = ui.switch(name, value=bool(session.value(name)), on_change=self._switched(name))
@@ -225,18 +228,19 @@ class _Page:
         why = await run.io_bound(self.session.explanation, x, y)
         self.reason.clear()
         with self.reason:
-            ui.image(_encoded(drawExplanation(why))).classes("w-full max-w-5xl").props("id=why")
             ui.label(f"Pixel ({x}, {y}), {'an edge' if why.edge else 'no edge'}: {why.reason}").props("id=words")
             if why.change:
-                with ui.row().classes("items-center"):
-                    text = ", ".join(f"{name}={value!r}" for name, value in why.change.items())
-                    ui.button(f"try {text}", on_click=lambda: self._try(why.change)).props("dense id=try")
+                text = ", ".join(f"{name}={value!r}" for name, value in why.change.items())
+                ui.button(f"try {text}", on_click=lambda: self._try(why.change)).props("dense no-caps id=try")
+            ui.image(_encoded(drawExplanation(why))).classes("w-full").props("id=why")
+        self.dialog.open()
 
     def _try(self, change: Any) -> None:
         for name, value in change.items():
             self.session.change(name, value)
             if name in self.sliders:
                 self.sliders[name].value = value
+        self.dialog.close()
         self._ask()
 
     def _download(self) -> None:

@@ -86,7 +86,8 @@ def _result(client: Any, group: list[Any], future: Any) -> list[Outcome] | None:
 
     start = time.perf_counter()
     try:
-        return future.result()
+        outcomes: list[Outcome] = future.result()
+        return outcomes
     except (CancelledError, OSError, TimeoutError):  # among them distributed's own, which derive from these
         return None
     except Exception as problem:

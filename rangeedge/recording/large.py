@@ -5,10 +5,13 @@ from __future__ import annotations
 import functools
 import math
 import mmap
-from collections.abc import Mapping
+import os
+import uuid
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 
 from .._check import error
@@ -16,9 +19,23 @@ from ..io import RangeImage
 from ..io.files import as_range_image
 from ..io.source import opened
 from ..io.tiff import Window, images_of_tiff, read_window, size_of_page
-from ..io.tiff_tags import PAGES, WIDTH, Page
-from .source import FrameSource
+from ..io.tiff_tags import (
+    GEO_KEYS,
+    GEO_REALS,
+    GEO_TEXTS,
+    MODEL_PIXEL_SCALE,
+    MODEL_TIE_POINT,
+    MODEL_TRANSFORMATION,
+    PAGES,
+    WIDTH,
+    Page,
+)
+from .source import FrameSource, extra
 from .stacks import is_zarr, zarr_array
+
+_TILE = 256  # pixels of a tile of the files that are written
+_GEO_TAGS = (MODEL_PIXEL_SCALE, MODEL_TIE_POINT, MODEL_TRANSFORMATION, GEO_KEYS, GEO_REALS, GEO_TEXTS)
+_ASCII, _SHORTS, _REALS = 2, 3, 12  # types of tags
 
 
 class LargeImage(NamedTuple):
@@ -29,6 +46,7 @@ class LargeImage(NamedTuple):
     dtype: np.dtype
     geometry: Mapping[str, Any]
     georeference: np.ndarray | None
+    tags: tuple[tuple[int, int, int, Any], ...] = ()  # of a GeoTIFF: code, type, count and value
 
 
 def open_large(path: str) -> LargeImage:
@@ -43,7 +61,56 @@ def open_large(path: str) -> LargeImage:
         page = _page(path)
         sized = size_of_page(page)
         shape = (sized.src.shape[0], page.value(WIDTH))
-        return LargeImage(path, shape, sized.src.dtype, sized.geometry, sized.georeference)
+        return LargeImage(path, shape, sized.src.dtype, sized.geometry, sized.georeference, _geo_tags(page))
+
+
+def _geo_tags(page: Page) -> tuple[tuple[int, int, int, Any], ...]:
+    """What places the image on the map, as it stands in the file."""
+    tags: list[tuple[int, int, int, Any]] = []
+    for code in _GEO_TAGS:
+        if code in page:
+            values = page.values(code)
+            if values.dtype.kind == "S":
+                tags.append((code, _ASCII, len(values), values.tobytes()))
+            else:
+                tags.append(
+                    (code, _REALS if values.dtype.kind == "f" else _SHORTS, len(values), tuple(values.tolist()))
+                )
+    return tuple(tags)
+
+
+def write_geotiff(path: Path, array: Any, image: LargeImage, rows: int) -> None:
+    """An array of a store as a GeoTIFF of deflated tiles, some `rows` at a time; the whole file or none."""
+    tifffile = extra("tifffile", "zarr", "a GeoTIFF")
+    height, width = array.shape
+    band = -(-rows // _TILE) * _TILE
+
+    def tiles() -> Iterator[np.ndarray]:
+        for start in range(0, height, band):
+            part = np.asarray(array[start : start + band])
+            part = np.pad(part, ((0, -len(part) % _TILE), (0, -width % _TILE)))
+            for top in range(0, len(part), _TILE):
+                for left in range(0, part.shape[1], _TILE):
+                    yield part[top : top + _TILE, left : left + _TILE]
+
+    temporary = path.with_name(f".{uuid.uuid4().hex}.tmp")
+    try:
+        with tifffile.TiffWriter(temporary, bigtiff=array.nbytes > 2**31) as writer:
+            writer.write(
+                tiles(),
+                shape=array.shape,
+                dtype=array.dtype,
+                tile=(_TILE, _TILE),
+                compression="zlib",
+                photometric="minisblack",
+                metadata=None,
+                extratags=[(*tag, True) for tag in image.tags],
+            )
+        os.replace(temporary, path)
+    except OSError as reason:
+        raise error(f"cannot write {str(path)!r}: {reason.strerror or reason}", cv2.Error.StsError) from reason
+    finally:
+        temporary.unlink(missing_ok=True)
 
 
 def _expect_image(path: str, shape: tuple[int, ...]) -> tuple[int, int]:

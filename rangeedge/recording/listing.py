@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from .._check import described, error, fail, public
 from ..io.source import file_name
@@ -72,7 +73,7 @@ def framesOf(
         inputs = [inputs]
     if isinstance(inputs, bytes) or not isinstance(inputs, Iterable):
         raise fail("inputs", "a path or an iterable of paths", described(inputs))
-    options = {} if calibration is None else {"calibration": calibration}
+    options: dict[str, Any] = {} if calibration is None else {"calibration": calibration}
     frames = [
         frame
         for given in inputs
@@ -81,7 +82,7 @@ def framesOf(
     return _named_apart(frames)
 
 
-def _listed(given: str | os.PathLike[str], topics: tuple[str, ...], options: dict[str, int]) -> list[FrameSource]:
+def _listed(given: str | os.PathLike[str], topics: tuple[str, ...], options: dict[str, Any]) -> list[FrameSource]:
     return [frame for path in _expanded(file_name(given, "inputs")) for frame in _frames(path, topics, options)]
 
 
@@ -95,7 +96,7 @@ def _expanded(path: str) -> list[str]:
     return found
 
 
-def _frames(path: str, topics: tuple[str, ...], options: dict[str, int]) -> list[FrameSource]:
+def _frames(path: str, topics: tuple[str, ...], options: dict[str, Any]) -> list[FrameSource]:
     where = Path(path)
     if not path or not where.exists():
         return [file_frame(path, _stem(path), **options)]
@@ -112,7 +113,7 @@ def _frames(path: str, topics: tuple[str, ...], options: dict[str, int]) -> list
     return found or [file_frame(path, _stem(path), **options)]
 
 
-def _of_folder(folder: Path, topics: tuple[str, ...], options: dict[str, int]) -> list[FrameSource]:
+def _of_folder(folder: Path, topics: tuple[str, ...], options: dict[str, Any]) -> list[FrameSource]:
     files, camera = folder_files(folder)
     found = [frame for path in files for frame in _frames(str(path), topics, options)]
     if not found:

@@ -64,14 +64,13 @@ class Manifest:
             os.close(lock)
 
     def keep(self, names: set[str]) -> None:
-        """Leave only the lines of these frames."""
-        self.lines = {name: line for name, line in self.lines.items() if name in names}
+        """Leave only the lines of these frames, in the file; none in memory."""
+        kept, self.lines = (line for name, line in self.lines.items() if name in names), {}
         with _named(self.path):
-            write_atomically(self.path, b"".join(map(_encoded, self.lines.values())))
+            write_atomically(self.path, b"".join(map(_encoded, kept)))
 
     def append(self, line: Line) -> None:
         """Add a line, in one piece or not at all."""
-        self.lines[line["frame"]] = line
         with _named(self.path):
             descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND)
             try:

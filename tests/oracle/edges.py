@@ -224,17 +224,19 @@ class Detector:
         place, along = (np.array(p) for p in line.place(x))
         sides = [(yf, mf, f.slope("slope") ** 2), (yg, mg, g.slope("slope") ** 2)]
         unit = float(np.hypot(*along))
+        spread = noise.of_jump("value") / (abs(mf - mg) * step) if mf != mg else math.inf
         return Candidate(
             **_at(line, before, after, sample),
             shift=sample - (left.last + right.first) / 2,
             jump=jump,
             crease=crease,
-            significance=max(jump_significance, crease_significance),
+            significance=crease_significance if crease > 0 else jump_significance,
             kind=kind,
             direction=line.direction,
             place=place,
             along=along / unit,
             sides=[(value, slope / unit, variance / unit**2) for value, slope, variance in sides],
+            spread=spread,
         )
 
 

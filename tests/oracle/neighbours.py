@@ -20,6 +20,7 @@ from rangeedge import (
 from .lines import SMALLEST, STEPS, Image
 
 REACH, CAPPED, LONE_SHARE = 4.0, 8.0, 1 / 3  # pixels; standard deviations
+MOST_SPREADS = math.inf, 4  # of the first alignment and the second one
 LEAST_SLOPE = 0.3
 LEAST_SPREAD, LEAST_DIRECTIONS = 0.05, (0.02, 1e-9)
 
@@ -41,6 +42,7 @@ class Candidate:
     place: np.ndarray
     along: np.ndarray
     sides: list
+    spread: float = math.inf  # standard deviation of the position of a crease, in samples
     smeared: bool = False  # a step over several samples, in whose middle it lies
 
 
@@ -55,7 +57,8 @@ class Neighbourhood:
             return self.found
         joint = [replace(c, significance=self._joint_significance(c)) for c in self.found]
         kept = Neighbourhood([c for c in joint if c.significance >= params.minSignificance], self.image)
-        kept = Neighbourhood([kept._aligned(c) for c in kept.found], self.image)
+        for spreads in MOST_SPREADS:
+            kept = Neighbourhood([kept._aligned(c, spreads) for c in kept.found], self.image)
         return kept._with_normals() if params.crease == CREASE_NORMAL else kept.found
 
     def _common_line(self, c, share=1.0):
@@ -70,7 +73,7 @@ class Neighbourhood:
         across = np.linalg.eigh(spread)[1][:, 0]
         return across, float(across @ mean)
 
-    def _aligned(self, c):
+    def _aligned(self, c, spreads):
         """A crease moved along its scan line onto the line it has in common with its neighbours."""
         line = self._common_line(c) if c.crease > 0 and not c.kind & EDGE_JUMP else None
         if line is None:
@@ -78,15 +81,18 @@ class Neighbourhood:
         across, distance = line
         dx, dy = STEPS[c.direction]
         slope = dx * across[0] + dy * across[1]
-        if abs(slope) < LEAST_SLOPE or abs(c.shift + distance / slope) > self.image.params.maxShift:
+        if abs(slope) < LEAST_SLOPE:
             return c
-        x, y = c.x + distance / slope * dx, c.y + distance / slope * dy
+        shift = distance / slope
+        if abs(c.shift + shift) > self.image.params.maxShift or abs(shift) > spreads * c.spread:
+            return c
+        x, y = c.x + shift * dx, c.y + shift * dy
         u = math.floor(x) if dx else round(x)
         v = math.floor(y) if dy > 0 else math.ceil(y) if dy < 0 else round(y)
         pixels = ((u, v), (u + dx, v + dy))
         if not all(self.image.has_data(*pixel) for pixel in pixels):
             return c
-        return replace(c, x=x, y=y, shift=c.shift + distance / slope, pixels=pixels)
+        return replace(c, x=x, y=y, shift=c.shift + shift, pixels=pixels)
 
     def _near(self, c):
         """Candidates of a common kind within reach, with weights."""

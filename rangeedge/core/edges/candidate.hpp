@@ -25,6 +25,7 @@ struct Side {
 struct Candidate {
     float x, y;          // position in pixels
     float shift;         // samples from the cut to the position
+    float spread;        // standard deviation of the position of a crease, in samples
     float jump, crease;  // length, degrees
     float significance;  // standard deviations as one of several neighbours has them, at last together with these
     std::uint8_t kind, direction;

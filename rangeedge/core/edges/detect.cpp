@@ -178,12 +178,15 @@ private:
         Candidate c{};
         c.jump = within_range(jump);
         c.crease = static_cast<float>(crease);
-        const double significance = jump > 0 ? std::max(jump_significance, crease_significance) : crease_significance;
+        // A jump that is none by itself says nothing of a crease.
+        const double significance = crease > 0 ? crease_significance : jump_significance;
         c.significance = std::min(static_cast<float>(significance), endless);
         if (jumps)
             c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
         if (crease > 0) c.kind |= is_convex(f1, f2) ? convex_bit : concave_bit;
         locate(c, line, edge);
+        const double bend = std::abs(f1.slope - f2.slope) * step;
+        c.spread = within_range(of_jump.single / bend);
         c.sides[0] = side(line, x, f1, slope1.single);
         c.sides[1] = side(line, x, f2, slope2.single);
         return c;

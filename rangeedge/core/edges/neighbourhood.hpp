@@ -48,8 +48,6 @@ public:
             visit(static_cast<std::size_t>(order_[k]), k);
         }
     }
-    // From now on the candidate at place k is nobody's neighbour.
-    void remove(std::size_t k) { kinds_[k] = 0; }
 
     // A candidate and the places, in three rows of cells, where its neighbours are.
     struct Near {

@@ -16,6 +16,9 @@ namespace {
 constexpr float largest_share = 8;      // standard deviations: at most so much evidence is a single candidate
 constexpr float lone_share = 1 / 3.0f;  // of its significance, is what a candidate without neighbours is worth
 constexpr int evidence_field = first_field;
+// Standard deviations by which creases move at the most when they are aligned, and then again, with neighbours that are
+// in line already: only as far as the noise explains it.
+constexpr double alignments[] = {HUGE_VAL, 4};
 
 // The weighted sum of squared significances.
 template <int bytes>
@@ -53,17 +56,16 @@ void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, 
             Candidate& c = candidates[i];
             c.significance = std::max(std::sqrt(evidence(near)), c.significance * lone_share);
         });
-        if (aligned) {
-            grid.for_each([&](std::size_t i, std::size_t k) {
-                if (weak(candidates[i])) grid.remove(k);
-            });
-            grid.for_each_near(team, [&](std::size_t i, const NeighbourGrid::Near& near) {
-                if (!weak(candidates[i])) align(candidates[i], near, frame, options.max_shift);
-            });
-        }
     }
     if (weak_ones) std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(*weak_ones), weak);
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), goes), candidates.end());
+    for (const double max_spreads : alignments) {
+        if (!aligned) break;
+        const NeighbourGrid grid(candidates, frame.rows, frame.cols, first_field);
+        grid.for_each_near(team, [&](std::size_t k, const NeighbourGrid::Near& near) {
+            align(candidates[k], near, frame, options.max_shift, max_spreads);
+        });
+    }
     if (!options.normals) return;
     const NeighbourGrid tangents = tangent_grid(candidates, frame.rows, frame.cols);
     tangents.for_each_near(team, [&](std::size_t i, const NeighbourGrid::Near& near) {

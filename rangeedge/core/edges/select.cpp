@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <numeric>
 #include <vector>
 
 #include "base/watch.hpp"
@@ -14,47 +13,108 @@ namespace {
 
 constexpr double usual_length = 10;  // of the line whose significance is that of its pixels
 
-// In how many columns a component has pixels.
-int columns_of(const Components& parts, int i, int cols) {
-    std::vector<char> seen(static_cast<std::size_t>(cols), 0);
-    for (const auto [begin, end] : parts.runs(i)) std::fill_n(seen.begin() + parts.col_of(begin), end - begin, 1);
-    return static_cast<int>(std::count(seen.begin(), seen.end(), 1));
+// An edge map, 0 and 1, with the margin of one pixel that components need.
+struct EdgeMap {
+    int rows, cols;
+    bool wrap;
+    std::size_t stride;
+    std::vector<std::uint8_t> pixels;
+
+    EdgeMap(int map_rows, int map_cols, bool wrapped)
+        : rows(map_rows), cols(map_cols), wrap(wrapped), stride(static_cast<std::size_t>(cols) + 2),
+          pixels(stride * (static_cast<std::size_t>(rows) + 2), 0) {}
+
+    std::uint8_t* row(int i) { return pixels.data() + stride * (static_cast<std::size_t>(i) + 1) + 1; }
+    const std::uint8_t* row(int i) const { return pixels.data() + stride * (static_cast<std::size_t>(i) + 1) + 1; }
+    Components components() const { return Components(pixels.data(), rows, cols, 8, wrap); }
+};
+
+// The length of a line: the longer side of its bounding box, or the number of its columns where the map wraps.
+class Extent {
+public:
+    explicit Extent(const EdgeMap& map)
+        : wrap_(map.wrap), left_(map.cols), top_(map.rows), seen_(wrap_ ? static_cast<std::size_t>(map.cols) : 0, 0) {}
+
+    void add(int row, int first, int last) {
+        left_ = std::min(left_, first), right_ = std::max(right_, last);
+        top_ = std::min(top_, row), bottom_ = std::max(bottom_, row);
+        if (wrap_) std::fill(seen_.begin() + first, seen_.begin() + last + 1, std::uint8_t{1});
+    }
+    int length() const {
+        const int wide = wrap_ ? static_cast<int>(std::count(seen_.begin(), seen_.end(), 1)) : right_ - left_ + 1;
+        return std::max(wide, bottom_ - top_ + 1);
+    }
+
+private:
+    bool wrap_;
+    int left_, right_ = -1, top_, bottom_ = -1;
+    std::vector<std::uint8_t> seen_;
+};
+
+// Each pixel with the eight around it.
+EdgeMap widened(const EdgeMap& edges) {
+    EdgeMap wide(edges.rows, edges.cols, edges.wrap);
+    const int last = edges.cols - 1;
+    for (int row = 0; row < edges.rows; ++row) {
+        Watch::checkpoint();
+        const std::uint8_t* from = edges.row(row);
+        for (int near = std::max(0, row - 1); near <= std::min(edges.rows - 1, row + 1); ++near) {
+            std::uint8_t* to = wide.row(near);
+            for (int col = 0; col <= last; ++col)
+                to[col] = static_cast<std::uint8_t>(to[col] | from[col - 1] | from[col] | from[col + 1]);
+            if (edges.wrap && edges.cols > 0) to[0] |= from[last], to[last] |= from[0];
+        }
+    }
+    return wide;
+}
+
+// Removes the lines that are not significant. Their pieces may lie a few pixels apart.
+void drop_faint(EdgeMap& edges, const float* significance, double least) {
+    const Components lines = widened(edges).components();
+    Checkpoints checkpoints;
+    for (int i = 0; i < lines.count(); ++i) {
+        checkpoints.pass();
+        Extent extent(edges);
+        double squares = 0, pixels = 0;
+        const auto for_each_pixel = [&](auto&& visit) {
+            for (const auto [begin, end] : lines.runs(i)) {
+                const int row = lines.row_of(begin), first = lines.col_of(begin);
+                std::uint8_t* own = edges.row(row);
+                for (int col = first; col < first + end - begin; ++col)
+                    if (own[col]) visit(row, col, own[col]);
+            }
+        };
+        for_each_pixel([&](int row, int col, std::uint8_t) {
+            const auto s = static_cast<double>(significance[static_cast<std::ptrdiff_t>(row) * edges.cols + col]);
+            extent.add(row, col, col);
+            squares += s * s, pixels += 1;
+        });
+        if (squares * extent.length() >= least * least * usual_length * pixels) continue;
+        for_each_pixel([](int, int, std::uint8_t& own) { own = 0; });
+    }
 }
 
 }  // namespace
 
 void keep_lines(const std::uint8_t* edges, int rows, int cols, bool wrap, int min_length, const float* significance,
                 double least_significance, std::uint8_t* kept) {
-    const auto stride = static_cast<std::size_t>(cols) + 2, width = static_cast<std::size_t>(cols);
-    std::vector<std::uint8_t> image(stride * (static_cast<std::size_t>(rows) + 2), 0);
-    for (std::size_t row = 0; row < static_cast<std::size_t>(rows); ++row)
-        for (std::size_t col = 0; col < width; ++col)
-            image[(row + 1) * stride + col + 1] = edges[row * width + col] != 0;
-    std::fill_n(kept, static_cast<std::size_t>(rows) * width, std::uint8_t{0});
-    const Components parts(image.data(), rows, cols, 8, wrap);
+    EdgeMap map(rows, cols, wrap);
+    const auto width = static_cast<std::ptrdiff_t>(cols);
+    for (int row = 0; row < rows; ++row)
+        std::transform(edges + row * width, edges + (row + 1) * width, map.row(row),
+                       [](std::uint8_t edge) { return static_cast<std::uint8_t>(edge != 0); });
+    if (significance && least_significance > 0) drop_faint(map, significance, least_significance);
+    std::fill_n(kept, rows * width, std::uint8_t{0});
+    const Components pieces = map.components();
     Checkpoints checkpoints;
-    for (int i = 0; i < parts.count(); ++i) {
+    for (int i = 0; i < pieces.count(); ++i) {
         checkpoints.pass();
-        int left = cols, right = -1, top = rows, bottom = -1;
-        double squares = 0, pixels = 0;
-        for (const auto [begin, end] : parts.runs(i)) {
-            left = std::min(left, parts.col_of(begin)), right = std::max(right, parts.col_of(end - 1));
-            top = std::min(top, parts.row_of(begin)), bottom = std::max(bottom, parts.row_of(begin));
-            if (!significance) continue;
-            const float* first =
-                significance + static_cast<std::size_t>(parts.row_of(begin)) * width + parts.col_of(begin);
-            squares = std::inner_product(first, first + (end - begin), first, squares);
-            pixels += static_cast<double>(end - begin);
-        }
-        const int wide = wrap ? columns_of(parts, i, cols) : right - left + 1;
-        const int length = std::max(wide, bottom - top + 1);
-        if (length < min_length) continue;
-        if (significance && !(squares * length >= least_significance * least_significance * usual_length * pixels))
-            continue;
-        for (const auto [begin, end] : parts.runs(i)) {
-            const auto row = static_cast<std::size_t>(parts.row_of(begin));
-            std::fill_n(kept + row * width + parts.col_of(begin), end - begin, std::uint8_t{1});
-        }
+        Extent extent(map);
+        for (const auto [begin, end] : pieces.runs(i))
+            extent.add(pieces.row_of(begin), pieces.col_of(begin), pieces.col_of(end - 1));
+        if (extent.length() < min_length) continue;
+        for (const auto [begin, end] : pieces.runs(i))
+            std::fill_n(kept + pieces.row_of(begin) * width + pieces.col_of(begin), end - begin, std::uint8_t{1});
     }
 }
 

@@ -7,10 +7,10 @@
 
 namespace rangeedge {
 
-// `kept` becomes 1 on the 8-connected components of `edges` whose bounding box has a side of at least `min_length`
-// pixels and whose `significance` (null: any) is at least `least_significance`, else 0. That of a line is the root mean
-// square of its pixels', times the root of its length in units of 10 pixels. `wrap` says that the first column follows
-// the last.
+// Pixels of `edges` that stay are 1 in `kept`, the others 0. A line, whose pixels may lie three apart, stays if its
+// `significance` (null: any) is at least `least_significance`: the root mean square of its pixels', times the root of
+// its length in units of 10 pixels. Of that those 8-connected pieces stay whose bounding box has a side of at least
+// `min_length` pixels. `wrap` says that the first column follows the last.
 void keep_lines(const std::uint8_t* edges, int rows, int cols, bool wrap, int min_length, const float* significance,
                 double least_significance, std::uint8_t* kept);
 

@@ -18,7 +18,7 @@ namespace {
 constexpr double tile_tolerance = 0.8;       // root mean square misfit of a tile, in tolerances of a pixel
 constexpr double shares[]{0.5, 1};           // of the mean square misfit: tiles that fit well come first
 constexpr int rounds_between_tiles = 8;      // of pixels
-constexpr int worth_tiles = 500;             // pixels that grew meanwhile
+constexpr int worth_tiles = 600;             // one pixel in so many that grew meanwhile
 constexpr int most_adjustments = 8;          // rounds at borders
 constexpr std::size_t prefetched = 12;       // pixels ahead
 constexpr std::size_t worth_threads = 1024;  // pixels
@@ -44,7 +44,7 @@ void Grower::grow(double tolerance) {
     do {
         over_tiles(patches_.tiles().large);
         over_tiles(patches_.tiles().small);
-    } while (over_pixels(rounds_between_tiles, true) > worth_tiles);
+    } while (over_pixels(rounds_between_tiles, true) > image_.size() / worth_tiles);
     over_pixels(image_.size(), true);
     patches_.refit();
 }
@@ -274,10 +274,16 @@ int Grower::over_pixels(int rounds, bool refit) {
 
 void Grower::adjust_borders() {
     front_.clear();
-    patches_.for_borders(0, image_.rows(), [&](int p) {
-        for (const int q : {p + 1, p + image_.stride()})
-            if (patches_[p] && patches_[q] && patches_[p] != patches_[q]) wait(p), wait(q);
+    std::vector<std::vector<int>> found(static_cast<std::size_t>(patches_.team().size()));
+    parallel_for(image_.rows(), patches_.team(), [&](int first, int last, int thread) {
+        patches_.for_borders(first, last, [&](int p) {
+            for (const int q : {p + 1, p + image_.stride()})
+                if (patches_[p] && patches_[q] && patches_[p] != patches_[q])
+                    for (const int of_pair : {p, q}) found[static_cast<std::size_t>(thread)].push_back(of_pair);
+        });
     });
+    for (const auto& of_thread : found)
+        for (const int p : of_thread) wait(p);
     for (int round = 0; round < most_adjustments && !front_.empty(); ++round) {
         choices_.resize(front_.size());
         for_front([&](std::size_t k) {

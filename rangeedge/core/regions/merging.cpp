@@ -101,12 +101,10 @@ void absorb_strips(PatchMap& patches, Adjacency& adjacency) {
         number[i] = static_cast<int>(strips.size());
     }
     if (strips.empty()) return;
-    std::vector<Pixels> pixels(strips.size()), best(strips.size());
+    std::vector<Pixels> best(strips.size());
     Array<int> strip_of(count, 0);
     for (int i = 1; i < patches.count(); ++i) strip_of[i] = number[patches.surface(i)];
-    patches.for_pixels([&](int p) {
-        if (const int k = strip_of[patches[p]]) pixels[static_cast<std::size_t>(k - 1)].push_back(p);
-    });
+    const std::vector<Pixels> pixels = patches.pixels_of(strip_of, static_cast<int>(strips.size()));
     parallel_each(static_cast<int>(strips.size()), patches.team(), [&](int strip, int) {
         const auto k = static_cast<std::size_t>(strip);
         int fitting = 0;

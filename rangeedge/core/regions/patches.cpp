@@ -144,6 +144,30 @@ void PatchMap::estimate_correlation(const std::vector<SurfaceSums>& sums) {
     }
 }
 
+// Every thread has its own rows.
+std::vector<Pixels> PatchMap::pixels_of(const Array<int>& number, int count) const {
+    const auto n = static_cast<std::size_t>(count);
+    std::vector<std::vector<Pixels>> found(static_cast<std::size_t>(team_.size()), std::vector<Pixels>(n));
+    parallel_for(image_.rows(), team_, [&](int first, int last, int thread) {
+        std::vector<Pixels>& own = found[static_cast<std::size_t>(thread)];
+        for (int row = first; row < last; ++row) {
+            Watch::checkpoint();
+            for (int p = image_.index(row, 0), end = p + image_.cols(), next = p; p < end; p = next) {
+                while (next < end && label_[next] == label_[p]) ++next;
+                const int k = number[label_[p]];
+                for (int q = p; k && q < next; ++q) own[static_cast<std::size_t>(k - 1)].push_back(q);
+            }
+        }
+    });
+    std::vector<Pixels> sets = std::move(found.front());
+    parallel_each(count, team_, [&](int i, int) {
+        const auto k = static_cast<std::size_t>(i);
+        for (std::size_t t = 1; t < found.size(); ++t)
+            sets[k].insert(sets[k].end(), found[t][k].begin(), found[t][k].end());
+    });
+    return sets;
+}
+
 bool PatchMap::cut_roofs() {
     // What has hardly grown since it was found to be no roof is none.
     Array<int> number(count(), 0);  // among the patches to test, from 1
@@ -153,10 +177,7 @@ bool PatchMap::cut_roofs() {
         if (p.surface.curved && p.count() >= least_curved && p.count() > grown * p.whole) number[i] = ++candidates;
     }
     if (!candidates) return false;
-    std::vector<Pixels> sets(static_cast<std::size_t>(candidates));
-    for_pixels([&](int p) {
-        if (const int k = number[label_[p]]) sets[static_cast<std::size_t>(k - 1)].push_back(p);
-    });
+    const std::vector<Pixels> sets = pixels_of(number, candidates);
     std::vector<std::vector<Piece>> pieces(sets.size());
     Array<int> owner(sets.size());
     for (int i = 1; i < count(); ++i)

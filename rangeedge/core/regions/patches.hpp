@@ -76,17 +76,12 @@ public:
     // Returns whether there is any patch. Markers tell how much the noise over a region is.
     void add_markers(const std::int32_t* markers);
     bool add_patches(const std::vector<Pixels>& sets, double limit);
+    // The pixels of patches, in raster order: sets 0 .. count - 1 of those whose patch has number 1 .. count.
+    std::vector<Pixels> pixels_of(const Array<int>& number, int count) const;
     // Divides the patches that have grown around a crease; returns whether there were any.
     bool cut_roofs();
     void refit();
 
-    template <class F>
-    void for_pixels(F&& visit) const {
-        for (int row = 0; row < image_.rows(); ++row) {
-            Watch::checkpoint();
-            for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; ++p) visit(p);
-        }
-    }
     // Pixels of rows [first, last) whose patch is not that of their right or lower neighbour, in raster order.
     template <class F>
     void for_borders(int first, int last, F&& visit) const {
