@@ -183,6 +183,12 @@ class NoiseModel:
         return cls(c=subpixel / (correlation * focalLength * baseline), correlation=correlation, length=length)
 
 
+def least_of_directions(fits: tuple[float, ...]) -> tuple[float, ...]:
+    """The noise of fits where it is that of rows or of columns, whichever is less."""
+    rows, columns = fits[4 : 4 + _DIRECTION], fits[4 + _DIRECTION :]
+    return (*fits[:4], *map(min, rows, columns), *map(min, rows, columns))
+
+
 def correlation_of(fits: tuple[float, ...]) -> float:
     """How much larger the deviation is over many pixels than between neighbours."""
     return (fits[4 + _DIRECTION - 1] + fits[4 + 2 * _DIRECTION - 1]) / (2 * _RESIDUAL)
