@@ -10,7 +10,7 @@ from . import _core
 from ._option import parsed, takes
 from .forms import range_array
 from .frame import Frame, read_frame
-from .noise_model import NoiseModel, correlation_of, least_of_directions
+from .noise_model import NoiseModel, correlation_of, independent
 from .options import GEOMETRY, ScanLineParams
 from .plausible import question_geometry, warn_of_thresholds
 
@@ -37,8 +37,8 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
     medians exceed these by are the factors in `fits`, along rows and along columns; |D| by depth tells how the waves of
     the noise grow with it. Whoever detects edges with the model counts with that; its `correlation` sums it up.
 
-    A scanner that turns measures each of its pixels for itself, and its lines are no quadratics of the number of a pixel:
-    what its rows exceed its columns by, or these them, is not noise.
+    A scanner that turns measures each of its pixels for itself, and its lines are no quadratics of the number of a
+    pixel: there the factors are the lesser of rows and columns, and at most 1.5.
 
     Parameters
     ----------
@@ -93,5 +93,5 @@ def estimated(frame: Frame) -> NoiseModel:
     numbers = _core.estimate_noise(frame.ordinate, frame.projective, frame.step, frame.threads)
     (a, b, c, _), fits = numbers[:4], tuple(numbers[4:])
     if frame.ranges:
-        fits = least_of_directions(fits)
+        fits = independent(fits)
     return NoiseModel(a, b, c, max(1.0, correlation_of(fits)), fits=fits)

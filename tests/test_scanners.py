@@ -57,9 +57,8 @@ def test_a_room_all_around(rows, noise, tilt):
     truth = borders(faces)
     for cloud in (points, camera_axes(points).astype(np.float32)):
         edges = detectEdges(cloud) > 0
-        least = 0.95 if noise < 0.01 else 0.9
-        assert near(edges, truth) >= least
-        assert near(truth, edges) >= least
+        assert near(edges, truth) >= 0.95
+        assert near(truth, edges) >= 0.95
 
 
 def test_a_pillar_has_an_outline_and_no_creases():
