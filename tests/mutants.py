@@ -155,7 +155,7 @@ MUTANTS = [
     *of("recording/listing.py", "batch recordings",
         ("return stem if stem.strip(\".\") else name", "return stem")),
     *of("sectors.py", "hostile scanners",
-        ("min(int(np.ceil(extent / _SECTOR)), count)", "int(np.ceil(extent / _SECTOR))")),
+        ("min(int(np.ceil(extent / _SECTOR)), count)", "1")),
     *of("dynamic.py", "selection",
         ("_CHAIN_POPULATION = 10 ", "_CHAIN_POPULATION = 12 ")),
 ]  # fmt: skip
