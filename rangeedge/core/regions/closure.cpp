@@ -119,10 +119,12 @@ void Closer::align(const OpenBorder& border) {
     for (const auto& [p, distance] : near) parts_.set(p, above(p) == first_above ? border.first : border.second);
 }
 
-// Whether either surface is that of the other part, too.
+// Whether the smaller part lies on the surface of the larger one.
 bool Closer::are_one(const OpenBorder& border) const {
-    return lies_on(parts_.pixels(border.second), part(border.first).surface) &&
-           lies_on(parts_.pixels(border.first), part(border.second).surface);
+    const bool first_larger = parts_.pixels(border.first).size() >= parts_.pixels(border.second).size();
+    const int larger = first_larger ? border.first : border.second,
+              smaller = first_larger ? border.second : border.first;
+    return lies_on(parts_.pixels(smaller), part(larger).surface);
 }
 
 void Closer::draw(std::uint8_t* lines) {
