@@ -199,3 +199,19 @@ def test_a_program_killed_while_it_writes_leaves_nothing(existing, tmp_path, mon
     assert seen == [before, before]
     assert (tmp_path / "out/a.txt").read_bytes() == b"a" * 10**6
     assert not [path for path in tmp_path.rglob("*") if path.suffix == ".tmp"]
+
+
+def test_labels_that_no_table_has_room_for():
+    labels = np.where(DEPTH > 1.5, 2**30, 1).astype(np.int32)
+    for call in (lambda: rangeedge.regionAdjacency(DEPTH, labels), lambda: rangeedge.drawRegions(labels)):
+        with pytest.raises(rangeedge.error, match="labels of up to 65535"):
+            call()
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.int32, np.uint8])
+def test_a_destination_of_another_type_is_left_alone(dtype):
+    dst = np.full(DEPTH.shape, 7, dtype)
+    found = rangeedge.distanceTransform(DEPTH > 1.5, dst=dst)
+    assert found is not dst
+    assert found.dtype == np.float32
+    assert (dst == 7).all()

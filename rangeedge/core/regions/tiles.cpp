@@ -135,7 +135,7 @@ TilePyramid::TilePyramid(const SurfaceImage& image, Team& team) : large(image, 8
         Array<SurfaceSums> quarters(2 * small.cols());
         for (int row = first; row < last; ++row) {
             const int two = std::min(2, small.rows() - 2 * row);
-            for (int k = 0; k < two; ++k) small.add_up_row(2 * row + k, &quarters[k * small.cols()]);
+            for (int k = 0; k < two; ++k) small.add_up_row(2 * row + k, quarters.data() + k * small.cols());
             for (int k = 0; k < two * small.cols(); ++k)
                 if (quarters[k].count()) small.set(2 * row * small.cols() + k, quarters[k]);
             for (int col = 0; row < large.rows() && col < large.cols(); ++col) {
