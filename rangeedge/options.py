@@ -108,7 +108,7 @@ class ScanLineParams(Options):
     --------
     >>> from rangeedge import FIT_INTERP, ScanLineParams
     >>> ScanLineParams().maxShift
-    8.0
+    12.0
     >>> ScanLineParams.paper().fit == FIT_INTERP
     True
     >>> ScanLineParams(maxGap=4, noise=0.002)
@@ -280,7 +280,7 @@ class ScanLineParams(Options):
         kernel="normals",
     )
     maxShift: float = option(
-        8.0,
+        12.0,
         _real(0),
         "float",
         "How far the adapted edge position may lie from the cut (paper, 4.2, Fig. 5); 0 keeps the cut.",
@@ -378,7 +378,7 @@ class Selection(Options):
         unit="pixels",
     )
     lineSignificance: float = option(
-        19.0,
+        20.0,
         _real(0),
         "float",
         "Least significance of a line, >= 0: the root mean square of its pixels' significance, times the root of its"
