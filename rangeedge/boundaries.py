@@ -121,7 +121,8 @@ def regionBoundaries(
     2. *Planes that meet* do so in a straight line of the image, and three of them in a point. With `src`, and a
        tolerance above 0, vertices within two pixels of such a line are moved onto it, and corners into its points.
     3. *In space* every vertex lies on the surface of the region: the plane, or the quadratic where a plane fails,
-       through its pixels, over the image, of heights on a grid or inverse depths of a camera.
+       through its pixels, over the image, of heights on a grid or inverse depths of a camera. In an image that looks
+       all around it is the mean of the points that the pixels of the region around it see, and 2. does not apply.
 
     Parameters
     ----------
@@ -182,7 +183,7 @@ def boundaries_of(labels: np.ndarray, frame: Frame | None, tolerance: float, uni
     corners, arcs, steps, rings, names = _core.trace_outlines(labels)
     vertices = corners - 0.5
     counts, beside = np.ascontiguousarray(arcs[:, 1]), names[arcs[:, 2:]]
-    surfaces = None if frame is None else _Surfaces(frame, labels)
+    surfaces = None if frame is None or frame.turn else _Surfaces(frame, labels)
     tolerances = np.full(len(arcs), tolerance)
     if units and surfaces is not None and len(arcs):
         tolerances /= surfaces.spacing(vertices[arcs[:, 0]], beside)
@@ -204,7 +205,10 @@ def boundaries_of(labels: np.ndarray, frame: Frame | None, tolerance: float, uni
     points["x"], points["y"] = vertices[index].T
     found["area"] = _areas(points, found)
     owner = np.repeat(found["label"], ring_counts)
-    points["point"] = np.nan if surfaces is None else surfaces.points(vertices[index], owner)
+    if surfaces is not None:
+        points["point"] = surfaces.points(vertices[index], owner)
+    else:
+        points["point"] = np.nan if frame is None else _measured(frame, labels, vertices[index], owner)
     return RegionBoundaries(points, found, vertices, named)
 
 
@@ -260,6 +264,21 @@ def _on_lines(vertices: np.ndarray, counts: np.ndarray, beside: np.ndarray, surf
     settled[far] = places[far]
     moved[end] = settled[corner]
     return moved
+
+
+def _measured(frame: Frame, labels: np.ndarray, vertices: np.ndarray, owner: np.ndarray) -> np.ndarray:
+    """The mean of the points that the pixels of its region around every vertex see."""
+    sums, counts = np.zeros((len(vertices), 3)), np.zeros((len(vertices), 1))
+    points = frame.points
+    for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        u, v = (np.floor(vertices) + np.array([dx, dy])).astype(int).T
+        inside = (u >= 0) & (v >= 0) & (u < labels.shape[1]) & (v < labels.shape[0])
+        u, v = np.where(inside, u, 0), np.where(inside, v, 0)
+        own = inside & (labels[v, u] == owner) & (frame.valid[v, u] > 0)
+        sums[own] += points[v[own], u[own]]
+        counts[own] += 1
+    with np.errstate(invalid="ignore"):
+        return sums / counts
 
 
 class _Surfaces:

@@ -32,6 +32,7 @@ from .results import (
     encoded,
     find_edges,
     find_regions,
+    on_map,
     outlines_of,
     region_files,
     write_folder,
@@ -307,7 +308,7 @@ def _segment(args: argparse.Namespace) -> int:
     if alone:
         _write_lines(args.out, outlines_of(found), image)
     else:
-        write_folder(args.out, region_files(found, args.image, options, image.georeference))
+        write_folder(args.out, region_files(found, args.image, options, image))
     _say_found(args.image, found.edges)
     print(f"{len(found.surfaces) - 1} regions from {found.seeds.max()} seeds")
     if not alone:
@@ -335,7 +336,7 @@ def _lines(args: argparse.Namespace) -> int:
 def _write_lines(path: Path, lines: Any, image: RangeImage) -> None:
     """Lines to a file of their own, on the map where the image is on one, over the image where that is a picture."""
     suffix = path.suffix.lower()
-    more: dict[str, Any] = {"transform": image.georeference} if suffix == ".geojson" else {}
+    more: dict[str, Any] = on_map(image) if suffix == ".geojson" else {}
     if suffix == ".svg":
         nothing = np.zeros(image.src.shape[:2], np.uint8)
         geometry = {name: value for name, value in image.geometry.items() if name in GEOMETRY}
