@@ -52,11 +52,13 @@ def named(name: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
     def naming(function: Callable[_P, _R]) -> Callable[_P, _R]:
         @functools.wraps(function)
         def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-            try:
-                return function(*args, **kwargs)
-            except error as problem:
-                problem.name(name)
-                raise
+            # Values may be so large or so small that they overflow: what comes of it counts as invalid, in silence.
+            with np.errstate(all="ignore"):
+                try:
+                    return function(*args, **kwargs)
+                except error as problem:
+                    problem.name(name)
+                    raise
 
         return call
 
@@ -119,14 +121,19 @@ def image32f(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.
         return np.ascontiguousarray(value, dtype=np.float32)
 
 
-def labels32s(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
-    """A label image as C-contiguous int32."""
+def labels32s(name: str, value: Any, shape: tuple[int, int] | None = None, *, listed: bool = False) -> np.ndarray:
+    """A label image as C-contiguous int32; with `listed`, there is room for a table with a row for each label."""
     expected = "an int32 array of shape (H, W)" if shape is None else f"an int32 array of shape {shape}"
     value = array(name, value, expected)
     if value.dtype != np.int32:
         raise fail(name, expected, described(value), cv2.Error.StsUnsupportedFormat)
     if shape is not None and value.shape != shape:
         raise fail(name, expected, described(value), cv2.Error.StsUnmatchedSizes)
+    most = max(value.size, 2**16 - 1)
+    if listed and value.max() > most:
+        raise fail(
+            name, f"{expected}, labels of up to {most}", f"labels of up to {value.max()}", cv2.Error.StsOutOfRange
+        )
     return np.ascontiguousarray(value)
 
 

@@ -105,7 +105,7 @@ def regionAdjacency(
     (params,) = parsed(options, ScanLineParams)
     frame = measured_frame(src, params, mask)
     gap, minContacts = integer("gap", gap, 0, 64), integer("minContacts", minContacts, 1)
-    found, _ = _neighbours(frame, labels32s("labels", labels, frame.shape), gap, minContacts)
+    found, _ = _neighbours(frame, labels32s("labels", labels, frame.shape, listed=True), gap, minContacts)
     return np.array([pair for pair, _ in found], PAIR)
 
 
@@ -160,7 +160,7 @@ def regionCorners(
     (params,) = parsed(options, ScanLineParams)
     frame = measured_frame(src, params, mask)
     gap, minContacts = integer("gap", gap, 0, 64), integer("minContacts", minContacts, 1)
-    found, surfaces = _neighbours(frame, labels32s("labels", labels, frame.shape), gap, minContacts)
+    found, surfaces = _neighbours(frame, labels32s("labels", labels, frame.shape, listed=True), gap, minContacts)
     lines = {pair[:2]: (pair[4], pixels) for pair, pixels in found if np.isfinite(pair[-1]).all()}
     beside: dict[int, set[int]] = {}
     for first, second in lines:

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _core
 from ._option import parsed, takes
-from .constants import EDGE_JUMP
+from .constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
 from .detector import selected, thin_lines
 from .edges import EdgeStrength, kernel_options, kindNames, no_strength
 from .frame import Frame
@@ -64,7 +64,8 @@ class EdgeChain:
         along the viewing axis, 0 of a crease); crease (degrees, 0 of a jump); significance; and measured, where the
         point would be by the scan lines that cross the edge there alone, without the averaging along the chain.
     kind : int
-        EDGE_JUMP, EDGE_CONVEX or EDGE_CONCAVE. Along a jump the nearer surface is on the left, seen in the image.
+        EDGE_JUMP, EDGE_CONVEX or EDGE_CONCAVE; EDGE_BOUNDARY beside pixels without data, with `boundaryEdges`. Along a
+        jump the nearer surface is on the left, seen in the image, and along a boundary the data.
     closed, straight : bool
         Whether the last point is followed by the first one; whether the points lie on a straight line of the image.
     jump, crease, significance : float
@@ -93,10 +94,11 @@ class EdgeChain:
 
     def __repr__(self) -> str:
         how = " closed" if self.closed else " straight" if self.straight else ""
-        size = f"jump {self.jump:.4g}" if self.kind & EDGE_JUMP else f"{self.crease:.4g} degrees"
+        size = f", {self.crease:.4g} degrees" if self.kind & (EDGE_CONVEX | EDGE_CONCAVE) else ""
+        size = f", jump {self.jump:.4g}" if self.kind & EDGE_JUMP else size
         return (
             f"<{kindNames(self.kind)}{how} chain: {len(self)} points, {self.pixels:.4g} pixels,"
-            f" length {self.length:.4g}, {size}>"
+            f" length {self.length:.4g}{size}>"
         )
 
 
@@ -173,7 +175,8 @@ def linkEdges(
     -------
     chains : EdgeChains
         A sequence of `EdgeChain`, on top of one array of points and one of chains. Lines of fewer than `minLength`
-        pixels are left out, and so are those beside pixels without data that `boundaryEdges` adds.
+        pixels are left out. Lines beside pixels without data, which `boundaryEdges` adds, lie half way to these, and
+        nothing is known of what is behind.
 
     Raises
     ------
@@ -218,7 +221,12 @@ def link_frame(frame: Frame, params: ScanLineParams, selection: Selection, linki
     if not parts:
         kept.append(_candidates(frame, params, strength))
     thin = thin_lines(frame, selected(frame, strength, selection))
-    options = _core.LinkOptions(bridge=linking.bridge, corner_angle=linking.cornerAngle, min_length=selection.minLength)
+    options = _core.LinkOptions(
+        bridge=linking.bridge,
+        corner_angle=linking.cornerAngle,
+        min_length=selection.minLength,
+        outlines=selection.boundaryEdges,
+    )
     if not parts:
         return EdgeChains(*_linked(frame, kept[0], thin, strength.kind, options))
     found = []
@@ -238,12 +246,13 @@ def _linked(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Points and chains along the lines of a map."""
     rows, headers = _core.link_edges(frame.kernel, candidates, thin, kinds, options, frame.threads)
-    points = _points(frame, rows, np.repeat(headers[:, 2] == EDGE_JUMP, headers[:, 1]))
+    points = _points(frame, rows, np.repeat(headers[:, 2], headers[:, 1]))
     return points, _chains(headers, points)
 
 
-def _points(frame: Frame, rows: np.ndarray, jumps: np.ndarray) -> np.ndarray:
+def _points(frame: Frame, rows: np.ndarray, kinds: np.ndarray) -> np.ndarray:
     """The points of the kernel in space."""
+    jumps, meets = kinds == EDGE_JUMP, (kinds & (EDGE_CONVEX | EDGE_CONCAVE)) != 0
     points = np.zeros(len(rows), POINT)
     points["x"], points["y"] = rows[:, 0], rows[:, 1]
     plane, ordinates, gradients = rows[:, 2:4], rows[:, 4:6], rows[:, 6:10].reshape(-1, 2, 2)
@@ -257,7 +266,7 @@ def _points(frame: Frame, rows: np.ndarray, jumps: np.ndarray) -> np.ndarray:
     points["normals"] = _normals(frame, plane, ordinates, gradients) @ axes
     first, second = points["normals"][:, 0], points["normals"][:, 1]
     apart = np.linalg.norm(first - second, axis=1), np.linalg.norm(first + second, axis=1)
-    points["crease"] = np.where(jumps, 0, np.degrees(2 * np.arctan2(*apart)))
+    points["crease"] = np.where(meets, np.degrees(2 * np.arctan2(*apart)), 0)
     points["significance"] = rows[:, 10]
     return points
 

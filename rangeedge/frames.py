@@ -12,9 +12,9 @@ import numpy as np
 from ._check import array, described, fail, integer, public
 from .io import RangeImage, imreadRange
 from .io.source import file_name
-from .recording.source import FrameSource
 
 if TYPE_CHECKING:
+    from .recording import FrameSource
     from .recording.workers import Outcome
 
 
@@ -122,6 +122,8 @@ def _each(frames: Any) -> Iterator[Any]:
 
 
 def _on_frame(function: Callable[..., Any], frame: Any) -> Any:
+    from .recording import FrameSource
+
     if isinstance(frame, FrameSource):
         frame = frame.read()
     elif isinstance(frame, (str, os.PathLike)):

@@ -81,7 +81,7 @@ def fitSegments(
     -------
     segments : structured ndarray
         ends (2, 3), in the unit of the chains, and pixels (2, 2), the same in the image; direction, a unit vector from
-        the first to the second end; length; kind (EDGE_JUMP, EDGE_CONVEX or EDGE_CONCAVE); jump; dihedral, the angle in
+        the first to the second end; length; kind, that of the chain; jump; dihedral, the angle in
         degrees between two faces that meet, through the solid: below 180 of a convex, above of a concave edge, NaN of a
         jump; rms, of the distances of points from the line before they were averaged; endDeviation, the standard
         deviation of an end across the line, and directionDeviation, that of the direction in degrees, both of the

@@ -72,7 +72,7 @@ def _angles(name: str, value: object, line: tuple[int, int], shape: tuple[int, i
     expected = f"{max(line)} finite angles in degrees, or an array of shape {shape}"
     try:
         angles = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise fail(name, expected, described(value)) from None
     if angles.shape == (max(line),):
         angles = angles.reshape(line)

@@ -139,6 +139,8 @@ def _off_cones(line: np.ndarray) -> float:
     """Of rays from a circle on the unit sphere, as a share of their extent."""
     rays = unit_rays(line)
     rays = rays - rays.mean(axis=0)
+    if not np.isfinite(rays).all():  # lengths that cannot be squared
+        return np.inf
     values = np.linalg.eigvalsh(rays.T @ rays / len(rays))
     return float(np.sqrt(max(values[0], 0.0) / values[2])) if values[2] > 0 else 0.0
 
@@ -148,7 +150,10 @@ def _common_point(lines: list[np.ndarray]) -> np.ndarray | None:
     normals, offsets, weights = [], [], []
     for line in lines:
         middle = line.mean(axis=0)
-        values, vectors = np.linalg.eigh((line - middle).T @ (line - middle) / len(line))
+        moments = (line - middle).T @ (line - middle) / len(line)
+        if not np.isfinite(moments).all():  # lengths that cannot be squared
+            continue
+        values, vectors = np.linalg.eigh(moments)
         if values[2] <= 0:
             continue
         normals.append(vectors[:, 0])

@@ -1,12 +1,18 @@
-"""Dimensions of a box from one depth frame: its edges, its corners, and how long it is along its three directions.
+"""
+How large is the box?
+=====================
 
     python samples/box_dimensions.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
 
-Without an image it renders a box as a Kinect would see it, and prints how far the result is from the truth.
+Its edges and corners from one depth frame, and how long it is along its three directions. Without an image it renders
+a box as a Kinect would see it, and prints how far the result is from the truth.
 """
 
+import argparse
+from pathlib import Path
+
+import cv2
 import numpy as np
-from common import load, parser, write
 
 import rangeedge
 from rangeedge.synthetic import box, kinectCamera, kinectNoise, plane, renderScene
@@ -39,9 +45,15 @@ def dimensions(segments):
 
 
 def main(argv=None):
-    args = parser(__doc__).parse_args(argv)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("image", nargs="?", help="depth image; default: a rendered one")
+    parser.add_argument("-K", type=lambda text: [float(f) for f in text.split(",")], help="fx,fy,cx,cy of the camera")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for what is written (default: out)")
+    args = parser.parse_args(argv)
+    args.out.mkdir(parents=True, exist_ok=True)
     rendered = args.image is None
-    src, geometry = built_in_scene() if rendered else load(args)
+    camera = {} if args.K is None else {"K": args.K}
+    src, geometry = built_in_scene() if rendered else rangeedge.imreadRange(args.image).withGeometry(**camera)
 
     found = rangeedge.fitSegments(rangeedge.linkEdges(src, **geometry))
     sizes = dimensions(found.segments)
@@ -52,8 +64,9 @@ def main(argv=None):
     convex = found.segments["dihedral"][found.segments["kind"] == rangeedge.EDGE_CONVEX]
     print("angles between faces:", " ".join(f"{angle:.2f}" for angle in convex), "degrees")
 
-    view = {name: geometry[name] for name in ("K", "heightMap") if name in geometry}
-    write(args.out, "box_dimensions.png", rangeedge.drawSegments(src, *found, scale=2, lengths=True, **view))
+    picture = rangeedge.drawSegments(src, *found, scale=2, lengths=True, **geometry)
+    cv2.imwrite(str(args.out / "box_dimensions.png"), picture)
+    print(args.out / "box_dimensions.png")
     return sizes
 
 

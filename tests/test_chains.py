@@ -8,6 +8,7 @@ import pytest
 
 import rangeedge
 from rangeedge import (
+    EDGE_BOUNDARY,
     EDGE_CONCAVE,
     EDGE_CONVEX,
     EDGE_JUMP,
@@ -232,6 +233,32 @@ def test_lengths_add_up(chains):
         places = np.column_stack([chain.points["x"], chain.points["y"]])
         assert chain.pixels == pytest.approx(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
         assert chain.length == pytest.approx(np.linalg.norm(np.diff(chain.points["point"], axis=0), axis=1).sum())
+
+
+@pytest.mark.parametrize("points", [False, True])
+def test_outlines_of_data_are_chains_on_request(scene, points):
+    background = ~(scene.rendering.faces > 0)
+    if points:
+        src, geometry = np.where(background[..., None], np.nan, scene.rendering.points), {}
+    else:
+        src, geometry = np.where(background, np.nan, scene.rendering.depth), {"K": K}
+    without = linkEdges(src, **geometry)
+    chains = linkEdges(src, boundaryEdges=True, **geometry)
+    outlines = [chain for chain in chains if chain.kind == EDGE_BOUNDARY]
+    assert sorted(c.kind for c in chains if c.kind != EDGE_BOUNDARY) == sorted(c.kind for c in without)
+    silhouette = [k for k in scene.visible if k not in {scene.owner(c)[0] for c in without}]
+    assert sorted(scene.owner(chain)[0] for chain in outlines) == silhouette
+    for chain in outlines:
+        pixels, lengths = scene.offsets(chain, scene.owner(chain)[0])
+        assert np.sqrt(np.mean(pixels**2)) < 0.05
+        assert np.sqrt(np.mean(lengths**2)) < 4e-4
+        assert np.isnan(chain.points["behind"]).all()
+        assert not chain.points["jump"].any()
+        p = chain.points[len(chain) // 2]
+        along = np.array([np.ptp(chain.points[n]) * np.sign(chain.points[n][-1] - chain.points[n][0]) for n in "xy"])
+        left = np.array([along[1], -along[0]]) / np.linalg.norm(along)
+        assert not background[int(np.rint(p["y"] + 2 * left[1])), int(np.rint(p["x"] + 2 * left[0]))]
+        assert background[int(np.rint(p["y"] - 2 * left[1])), int(np.rint(p["x"] - 2 * left[0]))]
 
 
 def test_threads_do_not_matter():

@@ -144,6 +144,27 @@ def test_random_shapes_equal_brute_force(seed):
     )
 
 
+@pytest.mark.parametrize("wrap", [False, True])
+@pytest.mark.parametrize("free", [7, 63, 118, 119, 120, 121, 127, 128, 129, 150])
+def test_short_and_long_distances_equal_brute_force(free, wrap):
+    """The nearest of few sources lies up to `free` columns and rows away, on either side of what is treated apart."""
+    rng = np.random.default_rng(free)
+    for shape in ((5, free + 70), (free + 3, 64), (40, 63)):
+        edges = np.zeros(shape, np.uint8)
+        edges[:, 0] = rng.random(shape[0]) < 0.3
+        edges[0] |= rng.random(shape[1]) < 0.02
+        edges[-1, -1] = 1
+        rows, cols = np.nonzero(edges)
+        across = np.abs(np.arange(shape[1])[:, None] - cols)
+        if wrap:
+            across = np.minimum(across, shape[1] - across)
+        squared = (np.arange(shape[0])[:, None, None] - rows) ** 2 + across**2
+        expected = np.sqrt(squared.min(axis=2).astype(np.float64)).astype(np.float32)
+        np.testing.assert_array_equal(distanceTransform(edges, wrap=wrap), expected)
+        halves = distanceTransform(edges, wrap=wrap, pixelSize=0.5)
+        np.testing.assert_array_equal(halves, expected / 2)
+
+
 def test_large_map_equals_brute_force_at_every_thread_count(monkeypatch):
     rng = np.random.default_rng(3)
     salience = np.maximum(ramps((256, 256)), random_map(rng, (256, 256), 0.004))

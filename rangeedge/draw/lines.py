@@ -128,7 +128,8 @@ def drawSegments(
     (48, 64, 3)
     """
     for name, value, dtype in (("segments", segments, SEGMENT), ("vertices", vertices, VERTEX)):
-        if value is not None and (not isinstance(value, np.ndarray) or value.dtype != dtype):
+        missing = value is None and name == "vertices"
+        if not missing and (not isinstance(value, np.ndarray) or value.dtype != dtype):
             raise fail(name, "a structured array from fitSegments", described(value))
     canvas, scale = canvas_of(src, scale, geometry)
     for segment in segments:

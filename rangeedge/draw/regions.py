@@ -71,7 +71,7 @@ def drawRegions(
            [119, 102, 204],
            [238, 204, 136]], dtype=uint8)
     """
-    labels = _check.labels32s("labels", labels)
+    labels = _check.labels32s("labels", labels, listed=True)
     alpha = _check.number("alpha", alpha, 0, 1)
     if src is None:
         canvas, alpha = np.zeros((*labels.shape, 3), np.uint8), 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -95,30 +96,28 @@ def hooverScores(
         keep = _check.image8("ignore", ignore, truth.shape) == 0
         labels, truth = labels[keep], truth[keep]
 
-    overlap, found_size, true_size = _overlaps(labels, truth)
-    true_share, found_share = overlap / true_size, overlap / found_size[:, None]
+    m, n, overlap, found_size, true_size = _overlaps(labels, truth)
+    true_share, found_share = overlap / true_size[n], overlap / found_size[m]
     found_map = _Mapping(len(found_size))
     true_map = _Mapping(len(true_size))
 
-    for m, n in zip(*np.nonzero((true_share >= T) & (found_share >= T)), strict=True):
-        measure = (true_share[m, n] + found_share[m, n]) / 2
-        found_map.assign(m, "correct", measure)
-        true_map.assign(n, "correct", measure)
-    for n in range(len(true_size)):
-        parts = np.flatnonzero(found_share[:, n] >= T)
-        covered = overlap[parts, n].sum()
-        if len(parts) >= 2 and covered / true_size[n] >= T:
-            measure = (covered / true_size[n] + covered / found_size[parts].sum()) / 2
-            if true_map.accepts(n, measure):
-                true_map.assign(n, "over", measure)
+    for pair in np.flatnonzero((true_share >= T) & (found_share >= T)):
+        measure = (true_share[pair] + found_share[pair]) / 2
+        found_map.assign(m[pair], "correct", measure)
+        true_map.assign(n[pair], "correct", measure)
+    for whole, pairs in _parts(n, found_share >= T):
+        parts, covered = m[pairs], overlap[pairs].sum()
+        if covered / true_size[whole] >= T:
+            measure = (covered / true_size[whole] + covered / found_size[parts].sum()) / 2
+            if true_map.accepts(whole, measure):
+                true_map.assign(whole, "over", measure)
                 found_map.assign(parts, "over", measure)
-    for m in range(len(found_size)):
-        parts = np.flatnonzero(true_share[m] >= T)
-        covered = overlap[m, parts].sum()
-        if len(parts) >= 2 and covered / found_size[m] >= T:
-            measure = (covered / true_size[parts].sum() + covered / found_size[m]) / 2
-            if found_map.accepts(m, measure):
-                found_map.assign(m, "under", measure)
+    for whole, pairs in _parts(m, true_share >= T):
+        parts, covered = n[pairs], overlap[pairs].sum()
+        if covered / found_size[whole] >= T:
+            measure = (covered / true_size[parts].sum() + covered / found_size[whole]) / 2
+            if found_map.accepts(whole, measure):
+                found_map.assign(whole, "under", measure)
                 true_map.assign(parts, "under", measure)
 
     return HooverScores(
@@ -151,14 +150,36 @@ class _Mapping:
         return int((self._role == role).sum())
 
 
-def _overlaps(labels: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Pixels shared by every pair of regions, and the sizes of either side's regions."""
-    found_ids, found = np.unique(np.maximum(labels.ravel(), 0), return_inverse=True)
-    true_ids, true = np.unique(np.maximum(truth.ravel(), 0), return_inverse=True)
-    table = np.bincount(found * len(true_ids) + true, minlength=len(found_ids) * len(true_ids))
-    table = table.reshape(len(found_ids), len(true_ids))
-    is_found, is_true = found_ids > 0, true_ids > 0
-    return table[np.ix_(is_found, is_true)], table.sum(1)[is_found], table.sum(0)[is_true]
+def _overlaps(labels: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The pairs of a region found and a true one that share pixels, how many, and the sizes of either side."""
+    found_ids, found, found_size = _numbered(labels)
+    true_ids, true, true_size = _numbered(truth)
+    pairs, overlap = np.unique(found * len(true_ids) + true, return_counts=True)
+    m, n = np.divmod(pairs, max(len(true_ids), 1))
+    background = [int((ids[:1] == 0).any()) for ids in (found_ids, true_ids)]
+    both = (m >= background[0]) & (n >= background[1])
+    return (
+        m[both] - background[0],
+        n[both] - background[1],
+        overlap[both],
+        found_size[background[0] :],
+        true_size[background[1] :],
+    )
+
+
+def _numbered(labels: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The labels that there are, ascending, where in that list each pixel is, and how many pixels each has."""
+    ids, number, count = np.unique(np.maximum(labels.ravel(), 0), return_inverse=True, return_counts=True)
+    return ids, number.ravel(), count
+
+
+def _parts(wholes: np.ndarray, inside: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """Of the pairs that are inside: every whole that has several, ascending, and these pairs."""
+    pairs = np.flatnonzero(inside)
+    pairs = pairs[np.argsort(wholes[pairs], kind="stable")]
+    ids, start, count = np.unique(wholes[pairs], return_index=True, return_counts=True)
+    for k in np.flatnonzero(count > 1):
+        yield int(ids[k]), pairs[start[k] : start[k] + count[k]]
 
 
 def _label_image(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:

@@ -190,7 +190,7 @@ def _transform(transform: Any) -> np.ndarray:
     expected = "a (2, 3) array, or six finite numbers"
     try:
         numbers = np.array(transform, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise fail("transform", expected, described(transform)) from None
     if numbers.shape not in ((2, 3), (6,)) or not np.isfinite(numbers).all():
         raise fail("transform", expected, described(transform))

@@ -270,7 +270,7 @@ def vector(name: str, value: Any, length: int = 3) -> np.ndarray:
     """A checked argument as float64."""
     try:
         result = np.asarray(value, np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         result = np.empty(0)
     if result.shape != (length,) or not np.isfinite(result).all():
         raise _check.fail(name, f"{length} finite numbers", _check.described(value))

@@ -23,5 +23,11 @@ inline bool normalise(Vector& a) {
     a = {a.x / size, a.y / size, a.z / size};
     return true;
 }
+// A direction across an axis: that of x, where that is none along it.
+inline Vector across(const Vector& axis) {
+    Vector right{1, 0, 0};
+    right = combination(right, -dot(axis, right), axis);
+    return normalise(right) ? right : Vector{0, 1, 0};
+}
 
 }  // namespace rangeedge

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 namespace rangeedge {
@@ -93,31 +94,34 @@ AffineFit fit_affine(const Array<ChannelSample>& samples, double allowed) {
 
 void smooth_parabolas(const Array<ChannelSample>& samples, std::ptrdiff_t places, bool closed, int reach,
                       Array<double>& values) {
-    Array<double> weights(places, 0), sums(places, 0);
-    for (const ChannelSample& s : samples) weights[s.place] += s.weight, sums[s.place] += s.weight * s.value;
+    // A closed chain goes on beyond its ends.
+    const std::ptrdiff_t beyond = closed ? reach : 0, size = places + 2 * beyond;
+    Array<double> weights(size, 0), sums(size, 0);
+    for (const ChannelSample& s : samples) {
+        weights[s.place + beyond] += s.weight, sums[s.place + beyond] += s.weight * s.value;
+    }
+    for (std::ptrdiff_t k = 0; k < beyond; ++k) {
+        const std::ptrdiff_t last = beyond + (places - 1 - k % places), first = beyond + k % places;
+        weights[beyond - 1 - k] = weights[last], sums[beyond - 1 - k] = sums[last];
+        weights[beyond + places + k] = weights[first], sums[beyond + places + k] = sums[first];
+    }
+    Array<std::int32_t> known(size + 1, 0);  // places before each of which something is known
+    for (std::ptrdiff_t k = 0; k < size; ++k) known[k + 1] = known[k] + (weights[k] > 0);
     values.assign(places, 0);
+    double reference = 0;  // differences from which keep their digits
     for (std::ptrdiff_t k = 0; k < places; ++k) {
-        std::ptrdiff_t first = k - reach, last = k + reach;
-        if (!closed) {
-            first = std::max<std::ptrdiff_t>(std::min(first, places - 1 - 2 * reach), 0);
-            last = std::min<std::ptrdiff_t>(first + 2 * reach, places - 1);
-        }
-        // Differences from the mean, which keep their digits.
-        double s[5] = {}, r[3] = {}, reference = 0;
-        int known = 0;
+        const std::ptrdiff_t centre = k + beyond;
+        const std::ptrdiff_t first = std::max<std::ptrdiff_t>(std::min(centre - reach, size - 1 - 2 * reach), 0);
+        const std::ptrdiff_t last = std::min<std::ptrdiff_t>(first + 2 * reach, size - 1);
+        if (weights[centre] > 0) reference = sums[centre] / weights[centre];
+        double s[5] = {}, r[3] = {};
         for (std::ptrdiff_t j = first; j <= last; ++j) {
-            const std::ptrdiff_t i = closed ? (j + places) % places : j;
-            if (!(weights[i] > 0)) continue;
-            if (!known++) reference = sums[i] / weights[i];
-            const double t = static_cast<double>(j - k), v = sums[i] - reference * weights[i];
-            double power = 1;
-            for (int e = 0; e < 5; ++e) {
-                s[e] += weights[i] * power;
-                if (e < 3) r[e] += v * power;
-                power *= t;
-            }
+            const double t = static_cast<double>(j - centre), w = weights[j], v = sums[j] - reference * w;
+            const double wt = w * t, wtt = wt * t;
+            s[0] += w, s[1] += wt, s[2] += wtt, s[3] += wtt * t, s[4] += wtt * (t * t);
+            r[0] += v, r[1] += v * t, r[2] += v * (t * t);
         }
-        values[k] = reference + parabola_at(0, s, r, known);
+        values[k] = reference + parabola_at(0, s, r, known[last + 1] - known[first]);
     }
 }
 

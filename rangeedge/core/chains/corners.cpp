@@ -108,7 +108,8 @@ public:
 
 private:
     std::ptrdiff_t size() const { return points_.size(); }
-    const Point& at(std::ptrdiff_t i) const { return points_[(i + 2 * size()) % size()]; }
+    // Around a closed chain, once.
+    const Point& at(std::ptrdiff_t i) const { return points_[i < 0 ? i + size() : i < size() ? i : i - size()]; }
 
     // By how much two lines are better than a smooth curve; 0 where they turn too little.
     double gain(const TwoLines& lines, int n) const {

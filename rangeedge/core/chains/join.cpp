@@ -107,7 +107,7 @@ private:
         const Piece& p = pieces_[static_cast<std::size_t>(a.piece)];
         const Piece& q = pieces_[static_cast<std::size_t>(b.piece)];
         if (p.type != q.type) return;
-        if (p.type == EdgeClass::jump && a.side == b.side) return;  // the nearer side would change
+        if (is_one_sided(p.type) && a.side == b.side) return;  // the nearer side would change
         const double gap = std::hypot(b.line.x - a.line.x, b.line.y - a.line.y);
         if (gap > options_.max_gap) return;
         const double turn = std::atan2(std::abs(a.line.dx * b.line.dy - a.line.dy * b.line.dx),
@@ -152,7 +152,7 @@ private:
             chain.closed = piece.closed || end == start;
         }
         // Jumps are followed with the nearer surface on the left.
-        if (chain.type == EdgeClass::jump && start % 2) std::reverse(chain.members.begin(), chain.members.end());
+        if (is_one_sided(chain.type) && start % 2) std::reverse(chain.members.begin(), chain.members.end());
         return chain;
     }
 

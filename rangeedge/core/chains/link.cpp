@@ -6,6 +6,7 @@
 #include "base/parallel.hpp"
 #include "chains/corners.hpp"
 #include "chains/join.hpp"
+#include "chains/outline.hpp"
 #include "chains/pieces.hpp"
 #include "chains/smooth.hpp"
 #include "chains/trace.hpp"
@@ -17,14 +18,23 @@ constexpr double largest_turn = 15;    // degrees, across a gap
 constexpr int chains_per_thread = 16;  // for fewer another thread is not worth starting
 
 std::int32_t kind_of(EdgeClass type) {
-    return type == EdgeClass::convex ? convex_bit : type == EdgeClass::concave ? concave_bit : jump_bit;
+    return type == EdgeClass::convex    ? convex_bit
+           : type == EdgeClass::concave ? concave_bit
+           : type == EdgeClass::outline ? boundary_bit
+                                        : jump_bit;
 }
 
 }  // namespace
 
 template <class T>
-LinkedEdges link_edges(const Frame<T>& frame, const std::vector<Candidate>& candidates, const std::uint8_t* thin,
+LinkedEdges link_edges(const Frame<T>& frame, const std::vector<Candidate>& found, const std::uint8_t* thin,
                        const std::uint8_t* kinds, const LinkOptions& options, int threads) {
+    std::vector<Candidate> with_outlines;
+    if (options.outlines) {
+        with_outlines = outline_candidates(frame, kinds);
+        with_outlines.insert(with_outlines.begin(), found.begin(), found.end());
+    }
+    const std::vector<Candidate>& candidates = options.outlines ? with_outlines : found;
     const Tracing tracing = trace_paths(thin, frame.rows, frame.cols);
     const Crossings crossings = assign_candidates(candidates, tracing, frame.rows, frame.cols);
     std::vector<Piece> chains = join_pieces(find_pieces(candidates, tracing, crossings, kinds, frame.cols), candidates,

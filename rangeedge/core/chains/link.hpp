@@ -22,6 +22,7 @@ struct LinkOptions {
     double bridge;        // pixels: the widest gap that is bridged
     double corner_angle;  // degrees: a chain ends where it turns by more
     int min_length;       // pixels
+    bool outlines;        // whether to link boundaries with pixels without data, too
 };
 
 // All numbers as double, so that points are rows of one array.
@@ -36,7 +37,7 @@ struct ChainPoint {
 
 struct ChainHeader {
     std::int32_t first, count;  // of its points
-    std::int32_t kind;          // jump_bit, convex_bit or concave_bit
+    std::int32_t kind;          // jump_bit, convex_bit, concave_bit or boundary_bit
     std::int32_t closed, straight;
 };
 

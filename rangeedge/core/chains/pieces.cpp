@@ -17,7 +17,7 @@ constexpr double least_crossing = 0.3;  // sine of the angle between a scan line
 constexpr int vote_reach = 2;           // pixels on either side that vote for a pixel's class
 constexpr int least_run = 4;            // pixels of one class
 
-using Votes = std::array<float, 5>;
+using Votes = std::array<float, 7>;
 
 // The tangent of a path at one of its pixels.
 Point tangent(const Tracing& tracing, const LinePath& path, std::ptrdiff_t i, int cols) {
@@ -28,14 +28,17 @@ Point tangent(const Tracing& tracing, const LinePath& path, std::ptrdiff_t i, in
 }
 
 EdgeClass class_of(const Candidate& c, const Point& along) {
-    if (!(c.kind & jump_bit)) {
+    const bool outlines = (c.kind & boundary_bit) != 0;
+    if (!(c.kind & jump_bit) && !outlines) {
         if (!(c.crease > 0)) return EdgeClass::none;
         return c.kind & convex_bit ? EdgeClass::convex : EdgeClass::concave;
     }
     const Point step = scan_step(c);
     const double leftward = step.x * along.y - step.y * along.x;
     if (std::abs(leftward) < least_crossing) return EdgeClass::none;
-    return (leftward < 0) == ((c.kind & occluding_bit) != 0) ? EdgeClass::jump : EdgeClass::jump_right;
+    const bool left = (leftward < 0) == ((c.kind & occluding_bit) != 0);
+    if (outlines) return left ? EdgeClass::outline : EdgeClass::outline_right;
+    return left ? EdgeClass::jump : EdgeClass::jump_right;
 }
 
 class Divider {
@@ -63,9 +66,9 @@ private:
             if (classes_[i] == EdgeClass::none || end - i < least_run) continue;
             Piece piece{{}, classes_[i], path.closed && end - i == n};
             for (std::ptrdiff_t k = i; k < end; ++k) piece.members.push_back(static_cast<std::int32_t>(path.first + k));
-            if (piece.type == EdgeClass::jump_right) {
+            if (piece.type == EdgeClass::jump_right || piece.type == EdgeClass::outline_right) {
                 std::reverse(piece.members.begin(), piece.members.end());
-                piece.type = EdgeClass::jump;
+                piece.type = piece.type == EdgeClass::jump_right ? EdgeClass::jump : EdgeClass::outline;
             }
             pieces_.push_back(std::move(piece));
         }
@@ -121,9 +124,9 @@ Crossings assign_candidates(const std::vector<Candidate>& candidates, const Trac
     for (std::ptrdiff_t i = 0; i < nearest.size(); ++i) {
         checkpoints.pass();
         const Candidate& c = candidates[static_cast<std::size_t>(i)];
-        // The line along a jump lies on its nearer side, which a smeared step is far from.
+        // The line along a jump lies on its nearer side, which a smeared step is far from, and an outline on that of data.
         const std::int32_t near = c.kind & occluding_bit ? c.before : c.after;
-        const bool jumps = c.kind & jump_bit;
+        const bool jumps = c.kind & (jump_bit | boundary_bit);
         const int col = jumps ? near % cols : static_cast<int>(std::lround(c.x));
         const int row = jumps ? near / cols : static_cast<int>(std::lround(c.y));
         const double x = jumps ? col : static_cast<double>(c.x), y = jumps ? row : static_cast<double>(c.y);

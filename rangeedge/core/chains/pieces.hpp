@@ -14,7 +14,11 @@
 
 namespace rangeedge {
 
-enum class EdgeClass : std::int32_t { none, jump, jump_right, convex, concave };  // of jumps: the nearer side is left
+// Of jumps and of the outlines of data: whether the nearer side, or the data, is on the left or on the right.
+enum class EdgeClass : std::int32_t { none, jump, jump_right, convex, concave, outline, outline_right };
+
+// Whether an edge has a side before the other.
+inline bool is_one_sided(EdgeClass type) { return type == EdgeClass::jump || type == EdgeClass::outline; }
 
 struct Piece {
     Array<std::int32_t> members;  // places in Tracing::pixels, in order
@@ -41,7 +45,7 @@ Point scan_step(const Candidate& c);
 inline bool belongs(const Candidate& c, EdgeClass type) {
     if (type == EdgeClass::convex || type == EdgeClass::concave)
         return !(c.kind & jump_bit) && c.crease > 0 && ((c.kind & convex_bit) != 0) == (type == EdgeClass::convex);
-    return (c.kind & jump_bit) != 0;
+    return (c.kind & (type == EdgeClass::outline ? boundary_bit : jump_bit)) != 0;
 }
 
 // The mean position of the candidates of a class at a place; false if there are none.

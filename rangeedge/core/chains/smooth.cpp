@@ -7,6 +7,7 @@
 
 #include "chains/channel.hpp"
 #include "chains/line_sums.hpp"
+#include "chains/samples.hpp"
 #include "chains/separation.hpp"
 
 namespace rangeedge {
@@ -21,17 +22,8 @@ constexpr double largest_precision = 1e30;           // of a slope
 constexpr int position_reach = 12, least_reach = 4;  // pixels on either side of a parabola
 constexpr int normal_reach = 10;                     // pixels on either side that tell a normal
 constexpr int gradient_rounds = 2;
-constexpr int tangent_reach = 3;  // pixels
 constexpr double reach_per_radius = 0.5;
-constexpr std::ptrdiff_t most_frayed = 6, fray_reach = 16;  // positions at an end, and inside of them
 constexpr std::ptrdiff_t least_share_inside = 5;
-constexpr double least_fray = 0.8, fray_deviations = 3;  // pixels; standard deviations
-
-struct Sample {
-    const Candidate* candidate;
-    std::ptrdiff_t place;
-    bool before_left;
-};
 
 // Sums over the slopes of a surface on scan lines, by their precision.
 struct SlopeSums {
@@ -50,11 +42,10 @@ class Smoother {
 public:
     Smoother(const Piece& chain, const Frame<T>& frame, const std::vector<Candidate>& candidates,
              const Crossings& crossings)
-        : chain_(chain), frame_(frame), candidates_(candidates), crossings_(crossings),
-          jumps_(chain.type == EdgeClass::jump) {}
+        : frame_(frame), gathered_(gather_samples(chain, candidates, crossings)), means_(gathered_.means),
+          samples_(gathered_.samples), closed_(chain.closed), jumps_(is_one_sided(chain.type)) {}
 
     SmoothChain smooth() {
-        gather();
         if (places() < 2) return {};
         result_.points.resize(static_cast<std::size_t>(places()));
         find_positions();
@@ -77,60 +68,19 @@ public:
     }
 
 private:
-    std::ptrdiff_t places() const { return means_.size(); }
+    std::ptrdiff_t places() const { return gathered_.places(); }
+    std::ptrdiff_t neighbour(std::ptrdiff_t k, std::ptrdiff_t step) const { return gathered_.neighbour(k, step); }
     ChainPoint& point(std::ptrdiff_t k) { return result_.points[static_cast<std::size_t>(k)]; }
-
-    std::ptrdiff_t neighbour(std::ptrdiff_t k, std::ptrdiff_t step) const {
-        if (chain_.closed) return ((k + step) % places() + places()) % places();  // a step may lead around
-        return std::min(std::max<std::ptrdiff_t>(k + step, 0), places() - 1);
-    }
-
-    void gather() {
-        Array<std::int32_t> members;
-        for (const std::int32_t member : chain_.members) {
-            Point mean;
-            if (!mean_position(candidates_, crossings_, member, chain_.type, mean)) continue;
-            means_.push_back(mean), members.push_back(member);
-        }
-        const std::ptrdiff_t first = frayed(false), end = members.size() - frayed(true);
-        std::copy(means_.begin() + first, means_.begin() + end, means_.begin());
-        means_.resize(end - first);
-        for (std::ptrdiff_t i = first; i < end; ++i)
-            for (std::int32_t k = crossings_.first[members[i]]; k < crossings_.first[members[i] + 1]; ++k) {
-                const Candidate& c = candidates_[static_cast<std::size_t>(crossings_.candidates[k])];
-                if (belongs(c, chain_.type)) samples_.push_back({&c, i - first, false});
-            }
-        for (Sample& s : samples_) {
-            const Point &a = means_[neighbour(s.place, -tangent_reach)], &b = means_[neighbour(s.place, tangent_reach)];
-            const Point step = scan_step(*s.candidate);
-            s.before_left = step.x * (b.y - a.y) - step.y * (b.x - a.x) < 0;
-        }
-    }
-
-    // How many positions at an end lead off the line through those further inside, as they do beside a corner.
-    std::ptrdiff_t frayed(bool at_end) const {
-        if (chain_.closed || places() < fray_reach + most_frayed) return 0;
-        const auto inward = [&](std::ptrdiff_t i) -> const Point& { return means_[at_end ? places() - 1 - i : i]; };
-        const Point& origin = inward(most_frayed);
-        PointSums sums;
-        for (std::ptrdiff_t i = most_frayed; i < most_frayed + fray_reach; ++i)
-            sums.add(inward(i).x - origin.x, inward(i).y - origin.y);
-        const StraightLine line = sums.line(1, 0);
-        const double most = std::max(least_fray, fray_deviations * std::sqrt(line.rss / fray_reach));
-        for (std::ptrdiff_t i = most_frayed; i > 0; --i)
-            if (std::abs(line.off(inward(i - 1).x - origin.x, inward(i - 1).y - origin.y)) > most) return i;
-        return 0;
-    }
 
     // ---- In the image ----
 
     void find_positions() {
-        if (!chain_.closed && find_straight_line()) return;
+        if (!closed_ && find_straight_line()) return;
         const int reach = parabola_reach();
         Array<double> values;
         for (const int axis : {0, 1}) {
             fill([&](const Sample& s) { return static_cast<double>(axis ? s.candidate->y : s.candidate->x); });
-            smooth_parabolas(channel_, places(), chain_.closed, reach, values);
+            smooth_parabolas(channel_, places(), closed_, reach, values);
             for (std::ptrdiff_t k = 0; k < places(); ++k) (axis ? point(k).y : point(k).x) = values[k];
         }
         positions_.resize(places());
@@ -244,7 +194,7 @@ private:
             }
         }
         const int reach = std::min<int>(position_reach, static_cast<int>((places() - 1) / 2));
-        smooth_parabolas(channel_, places(), chain_.closed, reach, values_);
+        smooth_parabolas(channel_, places(), closed_, reach, values_);
         for (std::ptrdiff_t k = 0; k < places(); ++k) set(point(k), values_[k]);
         return false;
     }
@@ -350,7 +300,7 @@ private:
         for (std::ptrdiff_t k = 0; k < places(); ++k) {
             SlopeSums near;
             for (int j = -reach; j <= reach; ++j)
-                if (chain_.closed || (k + j >= 0 && k + j < places())) near.add(sums[neighbour(k, j)]);
+                if (closed_ || (k + j >= 0 && k + j < places())) near.add(sums[neighbour(k, j)]);
             set_gradient(k, side, near, neighbour(k, -tangent_reach), neighbour(k, tangent_reach));
         }
     }
@@ -401,14 +351,12 @@ private:
         result_.points = std::move(sorted);
     }
 
-    const Piece& chain_;
     const Frame<T>& frame_;
-    const std::vector<Candidate>& candidates_;
-    const Crossings& crossings_;
-    bool jumps_, affine_[2] = {false, false}, gradients_known_ = false;
-    Array<Point> means_;       // of every place
+    const ChainSamples gathered_;
+    const Array<Point>& means_;
+    const Array<Sample>& samples_;
+    bool closed_, jumps_, affine_[2] = {false, false}, gradients_known_ = false;
     Array<double> positions_;  // along the straight line, else the numbers of places
-    Array<Sample> samples_;
     Array<ChannelSample> channel_;
     Array<double> values_;
     SmoothChain result_;

@@ -7,6 +7,8 @@
 // height is what the column's source contributes along the column. Any two parabolas of one width change places once,
 // hence an envelope is built from left to right with a stack, in time proportional to the number of columns.
 //
+// Where distances are short, looking at every column within reach is quicker than an envelope: window.hpp.
+//
 // Pixels may be taller than wide: lengths are in pixel widths, and squares along columns count `aspect` times. Where the
 // image wraps around, half a row of parabolas is repeated on either side.
 //
@@ -18,11 +20,13 @@
 #include <cstddef>
 #include <limits>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "base/array.hpp"
 #include "base/parallel.hpp"
 #include "distance/distance.hpp"
+#include "distance/window.hpp"
 
 namespace rangeedge {
 namespace {
@@ -212,6 +216,13 @@ void nearest_across_columns(const Sources& sources, const Grid& grid, int y, con
     for (int x = 0; x < grid.cols; ++x) to[x] = static_cast<float>(grid.width * std::sqrt(squared[x]));
 }
 
+// What a thread needs for a row.
+struct RowBuffers {
+    Envelope envelope;
+    Array<double> squared;
+    Window window;
+};
+
 template <class Sources>
 void nearest_by_sum(const Sources& sources, const Grid& grid, float* distance, std::int32_t* labels, int threads) {
     // Left as it comes: every thread touches its part first.
@@ -222,16 +233,18 @@ void nearest_by_sum(const Sources& sources, const Grid& grid, float* distance, s
     parallel_each(strips, team, [&](int s, int) {
         nearest_in_columns(sources, grid, s * strip, std::min(grid.cols, (s + 1) * strip), rows.get());
     });
-    struct Buffers {
-        Envelope envelope;
-        Array<double> squared;
-    };
-    std::vector<Buffers> buffers(static_cast<std::size_t>(team.size()));
-    for (Buffers& b : buffers) b.squared.resize(grid.cols);
+    std::vector<RowBuffers> buffers(static_cast<std::size_t>(team.size()));
+    for (RowBuffers& b : buffers) b.squared.resize(grid.cols);
+    const bool plain = std::is_same_v<Sources, Edges> && !labels && grid.height == grid.width;
     parallel_each((grid.rows - 1) / bunch + 1, team, [&](int b, int thread) {
-        Buffers& own = buffers[static_cast<std::size_t>(thread)];
-        for (int y = b * bunch; y < std::min(grid.rows, (b + 1) * bunch); ++y)
-            nearest_across_columns(sources, grid, y, rows.get(), own.envelope, own.squared, distance, labels);
+        RowBuffers& own = buffers[static_cast<std::size_t>(thread)];
+        bool short_ones = plain;  // in the row above: the next one is likely to be alike
+        for (int y = b * bunch; y < std::min(grid.rows, (b + 1) * bunch); ++y) {
+            const std::size_t row = grid.index(y, 0);
+            short_ones = short_ones && own.window.distances(rows.get() + row, y, grid, distance + row);
+            if (!short_ones)
+                nearest_across_columns(sources, grid, y, rows.get(), own.envelope, own.squared, distance, labels);
+        }
     });
 }
 

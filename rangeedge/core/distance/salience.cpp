@@ -58,7 +58,7 @@ public:
 
     // Fills the tile of tile_size << level pixels at (y, x), for which blocks_[level] are the candidates.
     void fill(int level, int y, int x) {
-        if (level > 0) Watch::checkpoint();
+        Watch::checkpoint();
         const int size = tile_size << level;
         const Tile tile{y,
                         x,

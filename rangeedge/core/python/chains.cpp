@@ -54,7 +54,7 @@ void bind_chains(nb::module_& m) {
     nb::class_<BoundCandidates>(m, "Candidates", "The edge candidates of a frame.");
     using L = LinkOptions;
     bind_options(m, "LinkOptions", field("bridge", &L::bridge), field("corner_angle", &L::corner_angle),
-                 field("min_length", &L::min_length));
+                 field("min_length", &L::min_length), field("outlines", &L::outlines));
     m.def("keep_candidates", &keep_candidates, "frame"_a, "options"_a, "threads"_a, array("jump"), array("crease"),
           array("kind"), array("significance"), Unlocked());
     m.def("link_edges", &bound_link_edges, "frame"_a, "candidates"_a, array("thin"), array("kinds"), "options"_a,

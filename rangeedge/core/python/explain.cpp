@@ -13,7 +13,7 @@ namespace {
 nb::tuple kept_and_weak(const BoundFrame& bound, const ScanLineOptions& options, int threads) {
     std::vector<Candidate> kept, weak;
     {
-        nb::gil_scoped_release release;
+        const Unlock unlock;
         std::visit([&](const auto& frame) { kept = find_candidates(frame, options, threads, nullptr, &weak); },
                    bound.frame);
     }

@@ -1,24 +1,38 @@
 // Patches grow over tiles first: a tile of 8 x 8 pixels without an edge joins the neighbouring patch it fits best, by
-// its power sums alone, tiles with the smallest misfit first; then tiles of 4 x 4. What is left are strips along edges
-// and borders, which grow pixel by pixel in rounds: all pixels that touch a patch choose among the patches they touch,
-// then all choices become true at once. So every round can be shared among threads, and its outcome does not depend on
-// how.
+// its power sums alone, those that fit well before all others; then tiles of 4 x 4. What is left are strips along edges
+// and borders, which grow pixel by pixel. Both grow in rounds: all that touch a patch choose among the patches they
+// touch, then all choices become true at once. So every round can be shared among threads, and its outcome does not
+// depend on how.
 // SPDX-License-Identifier: Apache-2.0
 #include "regions/growing.hpp"
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <utility>
 
 namespace rangeedge {
 namespace {
 
 constexpr double tile_tolerance = 0.8;       // root mean square misfit of a tile, in tolerances of a pixel
+constexpr double shares[]{0.5, 1};           // of the mean square misfit: tiles that fit well come first
 constexpr int rounds_between_tiles = 8;      // of pixels
 constexpr int worth_tiles = 500;             // pixels that grew meanwhile
 constexpr int most_adjustments = 8;          // rounds at borders
 constexpr std::size_t prefetched = 12;       // pixels ahead
-constexpr std::size_t worth_threads = 2048;  // pixels
+constexpr std::size_t worth_threads = 1024;  // pixels
+constexpr std::size_t tiles_worth_threads = 64;
+
+// Visits the pixels around a tile.
+template <class F>
+void for_around(const Tiles& tiles, int t, int stride, F&& visit) {
+    const int p = tiles.first_pixel(t), side = tiles.side();
+    for (int k = 0; k < side; ++k) visit(p - stride + k);
+    for (int k = 0; k < side; ++k) visit(p + side * stride + k);
+    for (int k = 0; k < side; ++k) visit(p - 1 + k * stride);
+    for (int k = 0; k < side; ++k) visit(p + side + k * stride);
+}
 
 }  // namespace
 
@@ -59,7 +73,7 @@ void Grower::start(PatchMap::Free reach, double tolerance) {
 
 void Grower::wait(int p) {
     if (waiting_[p]) return;
-    waiting_[p] = 1;
+    waiting_[p] = pixel_waits;
     front_.push_back(p);
 }
 
@@ -76,73 +90,112 @@ bool Grower::is_free(const Tiles& tiles, int t) const {
     return true;
 }
 
-// The misfit of a tile to a patch, as a level of the queue.
-int Grower::level_of(const Tiles& tiles, int t, int i) const {
-    const double limit = tile_tolerance * tile_tolerance * limit_;
-    const double r = image_.residual(tiles.sums(t), patches_.patch(i).surface);
-    return r < limit ? static_cast<int>(r / limit * TileQueue::levels) : TileQueue::levels;
+// Which of the patches around a tile it fits best.
+Grower::Choice Grower::choose(const Tiles& tiles, int t, const SurfaceSums& sums) const {
+    Choice best{0, HUGE_VAL};
+    std::array<int, 4> known{};  // lately
+    std::size_t next = 0;
+    for_around(tiles, t, image_.stride(), [&](int q) {
+        const int i = patches_[q];
+        if (!i || std::find(known.begin(), known.end(), i) != known.end()) return;
+        known[next++ % known.size()] = i;
+        const double r = image_.residual(sums, patches_.patch(i).surface);
+        if (r < best.residual) best = {i, r};
+    });
+    return best;
 }
 
-void Grower::take_tile(const Tiles& tiles, int t, int i) {
+void Grower::take_tile(const Tiles& tiles, int t, int i, const SurfaceSums& sums) {
     Patch& patch = patches_.patch(i);
-    patch.sums.add(tiles.sums(t));
+    patch.sums.add(sums);
     refit_when_due(patch);
     for (int row = 0; row < tiles.side(); ++row)
         for (int p = tiles.first_pixel(t) + row * image_.stride(), end = p + tiles.side(); p < end; ++p)
             patches_.take(p, i);
-    taken_.push_back(t);
 }
 
-// Offers every free tile to the patches that touch it, and those around it in turn.
+// Calls body(mine) on all threads if it is `shared`, where mine(i) says whether patch i belongs to the thread.
+template <class F>
+void Grower::for_patches(bool shared, F&& body) {
+    const int threads = shared ? patches_.team().size() : 1;
+    const auto of_thread = [&](int thread) { body([=](int i) { return i % threads == thread; }); };
+    if (threads > 1)
+        patches_.team().run(of_thread);
+    else
+        of_thread(0);
+}
+
 void Grower::over_tiles(const Tiles& tiles) {
-    const int stride = image_.stride(), side = tiles.side();
-    const auto for_around = [&](int t, auto&& visit) {  // the pixels around a tile
-        const int p = tiles.first_pixel(t);
-        for (int k = 0; k < side; ++k) visit(p - stride + k);
-        for (int k = 0; k < side; ++k) visit(p + side * stride + k);
-        for (int k = 0; k < side; ++k) visit(p - 1 + k * stride);
-        for (int k = 0; k < side; ++k) visit(p + side + k * stride);
-    };
-    // Those that touch a patch, in parallel; each thread keeps the order, and so does the queue.
-    std::vector<std::vector<std::pair<int, TileQueue::Entry>>> offers(static_cast<std::size_t>(patches_.team().size()));
+    // Free tiles that touch a patch, in raster order.
+    std::vector<std::vector<int>> found(static_cast<std::size_t>(patches_.team().size()));
     parallel_for(tiles.count(), patches_.team(), [&](int begin, int end, int thread) {
         for (int t = begin; t < end; ++t) {
             if (!is_free(tiles, t)) continue;
-            std::array<int, 4> offered{};  // lately
-            std::size_t next = 0;
-            for_around(t, [&](int q) {
-                const int i = patches_[q];
-                if (!i || std::find(offered.begin(), offered.end(), i) != offered.end()) return;
-                offered[next++ % offered.size()] = i;
-                const int level = level_of(tiles, t, i);
-                if (level < TileQueue::levels) offers[static_cast<std::size_t>(thread)].push_back({level, {t, i}});
-            });
+            bool touches = false;
+            for_around(tiles, t, image_.stride(), [&](int q) { touches = touches || patches_[q]; });
+            if (touches) found[static_cast<std::size_t>(thread)].push_back(t);
         }
     });
-    for (const auto& of_thread : offers)
-        for (const auto& [level, entry] : of_thread) queue_.push(level, entry);
-    taken_.clear();
-    TileQueue::Entry entry{};
-    Checkpoints checkpoints(256);
-    while (queue_.pop(entry)) {
-        checkpoints.pass();
-        const auto [t, i] = entry;
-        if (!is_free(tiles, t)) continue;
-        if (level_of(tiles, t, i) == TileQueue::levels) continue;  // the surface has changed meanwhile
-        take_tile(tiles, t, i);
-        const int row = t / tiles.cols(), col = t % tiles.cols();
-        for (const auto& [inside, beside] :
-             {std::make_pair(row > 0, t - tiles.cols()), std::make_pair(row + 1 < tiles.rows(), t + tiles.cols()),
-              std::make_pair(col > 0, t - 1), std::make_pair(col + 1 < tiles.cols(), t + 1)})
-            if (inside && is_free(tiles, beside)) {
-                const int level = level_of(tiles, beside, i);
-                if (level < TileQueue::levels) queue_.push(level, {beside, i});
-            }
-    }
+    tiles_.clear(), taken_.clear();
+    for (const auto& of_thread : found) tiles_.insert(tiles_.end(), of_thread.begin(), of_thread.end());
+    const double limit = tile_tolerance * tile_tolerance * limit_;
+    for (const double share : shares) over_tiles(tiles, share * limit);
     for (const int t : taken_)
-        for_around(t, [&](int q) {
+        for_around(tiles, t, image_.stride(), [&](int q) {
             if (patches_.is_free(q, reach_)) wait(q);
         });
+}
+
+// Takes tiles whose misfit is below `limit`, and those around them in turn. Others that were looked at are left in
+// tiles_.
+void Grower::over_tiles(const Tiles& tiles, double limit) {
+    rejected_.clear();
+    while (!tiles_.empty()) {
+        const int count = static_cast<int>(tiles_.size());
+        const bool shared = tiles_.size() >= tiles_worth_threads;
+        choices_.assign(tiles_.size(), {});
+        sums_.resize(std::max(sums_.size(), tiles_.size()));
+        const auto choose_all = [&](int begin, int end, int) {
+            Checkpoints checkpoints(256);
+            for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+                checkpoints.pass();
+                if (!is_free(tiles, tiles_[k])) continue;
+                sums_[k] = tiles.sums(tiles_[k]);
+                choices_[k] = choose(tiles, tiles_[k], sums_[k]);
+            }
+        };
+        if (shared)
+            parallel_for(count, patches_.team(), choose_all);
+        else
+            choose_all(0, count, 0);
+        for_patches(shared, [&](auto&& mine) {
+            for (std::size_t k = 0; k < tiles_.size(); ++k)
+                if (choices_[k].patch && choices_[k].residual < limit && mine(choices_[k].patch))
+                    take_tile(tiles, tiles_[k], choices_[k].patch, sums_[k]);
+        });
+        const std::size_t before = taken_.size();
+        for (std::size_t k = 0; k < tiles_.size(); ++k) {
+            waiting_[tiles.first_pixel(tiles_[k])] &= pixel_waits;
+            if (choices_[k].patch) (choices_[k].residual < limit ? taken_ : rejected_).push_back(tiles_[k]);
+        }
+        tiles_.clear();
+        for (std::size_t k = before; k < taken_.size(); ++k) {
+            const int t = taken_[k], row = t / tiles.cols(), col = t % tiles.cols();
+            for (const auto& [inside, beside] :
+                 {std::make_pair(row > 0, t - tiles.cols()), std::make_pair(row + 1 < tiles.rows(), t + tiles.cols()),
+                  std::make_pair(col > 0, t - 1), std::make_pair(col + 1 < tiles.cols(), t + 1)}) {
+                if (!inside || !tiles.is_open(beside)) continue;
+                std::uint8_t& waiting = waiting_[tiles.first_pixel(beside)];
+                if (waiting & tile_waits || !patches_.is_free(tiles.first_pixel(beside), reach_)) continue;
+                waiting |= tile_waits;
+                tiles_.push_back(beside);
+            }
+        }
+    }
+    // Each once, in raster order.
+    std::sort(rejected_.begin(), rejected_.end());
+    rejected_.erase(std::unique(rejected_.begin(), rejected_.end()), rejected_.end());
+    tiles_.swap(rejected_);
 }
 
 Grower::Choice Grower::choose(int p) const {
@@ -178,14 +231,13 @@ void Grower::for_front(F&& visit) {
 
 // Choices become true. Every patch belongs to one thread, which adds its pixels in order.
 void Grower::commit(bool refit) {
-    const int threads = front_.size() >= worth_threads ? patches_.team().size() : 1;
-    const auto of_thread = [&](int thread) {
+    for_patches(front_.size() >= worth_threads, [&](auto&& mine) {
         Checkpoints checkpoints;
         for (std::size_t k = 0; k < front_.size(); ++k) {
             checkpoints.pass();
             const int p = front_[k], i = choices_[k].patch;
             patches_.prefetch(front_[std::min(k + prefetched, front_.size() - 1)]);
-            if (i % threads != thread) continue;
+            if (!mine(i)) continue;
             waiting_[p] = 0;
             if (!i) continue;
             patches_.take(p, i);
@@ -194,11 +246,7 @@ void Grower::commit(bool refit) {
             patch.sums.add(image_.sample(p));
             refit_when_due(patch);
         }
-    };
-    if (threads > 1)
-        patches_.team().run(of_thread);
-    else
-        of_thread(0);
+    });
 }
 
 // Returns how many pixels were taken.

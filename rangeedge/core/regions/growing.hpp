@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -11,38 +10,6 @@
 #include "regions/patches.hpp"
 
 namespace rangeedge {
-
-// Tiles and patches by the misfit of one to the other, the smallest first, first come first served among equals.
-class TileQueue {
-public:
-    static constexpr int levels = 32;
-    struct Entry {
-        int tile, patch;
-    };
-
-    void push(int level, Entry entry) {
-        bucket_[static_cast<std::size_t>(level)].push_back(entry);
-        lowest_ = std::min(lowest_, static_cast<std::size_t>(level));
-    }
-    bool pop(Entry& entry) {
-        for (; lowest_ < levels; ++lowest_) {
-            auto& bucket = bucket_[lowest_];
-            std::size_t& head = head_[lowest_];
-            if (head < bucket.size()) {
-                entry = bucket[head++];
-                return true;
-            }
-            bucket.clear();
-            head = 0;
-        }
-        return false;
-    }
-
-private:
-    std::array<std::vector<Entry>, levels> bucket_;
-    std::array<std::size_t, levels> head_{};
-    std::size_t lowest_ = levels;
-};
 
 // Grows the patches of one image. What it allocates is as large as the image, so it is made once.
 class Grower {
@@ -65,11 +32,14 @@ private:
 
     void start(PatchMap::Free reach, double tolerance);
     void over_tiles(const Tiles& tiles);
+    void over_tiles(const Tiles& tiles, double limit);
     int over_pixels(int rounds, bool refit);
     bool is_free(const Tiles& tiles, int t) const;
-    int level_of(const Tiles& tiles, int t, int i) const;
-    void take_tile(const Tiles& tiles, int t, int i);
+    Choice choose(const Tiles& tiles, int t, const SurfaceSums& sums) const;
+    void take_tile(const Tiles& tiles, int t, int i, const SurfaceSums& sums);
     void refit_when_due(Patch& patch);
+    template <class F>
+    void for_patches(bool shared, F&& body);
     Choice choose(int p) const;
     void commit(bool refit);
     void wait(int p);
@@ -80,9 +50,12 @@ private:
     const SurfaceImage& image_;
     PatchMap::Free reach_ = PatchMap::open_pixel;
     double limit_ = 0;  // of squared residuals
-    TileQueue queue_;
-    Array<std::uint8_t> waiting_;  // whether a pixel is in front_
-    std::vector<int> front_, next_, taken_;
+    // Whether a pixel is in front_, or the tile that begins with it in tiles_.
+    static constexpr std::uint8_t pixel_waits = 1, tile_waits = 2;
+    Array<std::uint8_t> waiting_;
+    std::vector<int> front_, next_;
+    std::vector<int> tiles_, rejected_, taken_;
+    std::vector<SurfaceSums> sums_;  // of tiles_
     std::vector<Choice> choices_;
 };
 

@@ -4,6 +4,8 @@
 // it only goes up and down again. So a few summits and passes tell what all the pixels do. Passes are taken in falling
 // order, as water that sinks uncovers them: each joins two islands, and the lower of their peaks counts by itself if
 // the pass is low beside it.
+//
+// Ways uphill are followed in bands of rows, in parallel: within its band first, then from band to band.
 // SPDX-License-Identifier: Apache-2.0
 #include "regions/seeds.hpp"
 
@@ -12,12 +14,14 @@
 #include <cstddef>
 #include <cstring>
 #include <limits>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "base/array.hpp"
 #include "base/disjoint_sets.hpp"
 #include "base/parallel.hpp"
+#include "base/simd.hpp"
 
 namespace rangeedge {
 namespace {
@@ -34,9 +38,16 @@ float value_of(std::int32_t bits) {
     return value;
 }
 
+// Bits of the distances of a row; 0 where there is no pixel.
+RANGEEDGE_WIDE void keep_levels(const float* distance, const std::uint8_t* mask, int n, float lowest,
+                                std::int32_t* level) {
+    for (int k = 0; k < n; ++k) level[k] = distance[k] > 0 && !(distance[k] < lowest) ? bits_of(distance[k]) : 0;
+    for (int k = 0; mask && k < n; ++k) level[k] = mask[k] ? level[k] : 0;
+}
+
 // Where a row of neighbours is higher than what was found so far, they and the step to them take its place.
-void keep_highest(const std::int32_t* __restrict beside, std::int32_t step, int n, std::int32_t* __restrict highest,
-                  std::int32_t* __restrict to) {
+RANGEEDGE_WIDE void keep_highest(const std::int32_t* __restrict beside, std::int32_t step, int n,
+                                 std::int32_t* __restrict highest, std::int32_t* __restrict to) {
     for (int k = 0; k < n; ++k) {
         const std::int32_t better = -(beside[k] > highest[k]);
         highest[k] = (beside[k] & better) | (highest[k] & ~better);
@@ -44,9 +55,30 @@ void keep_highest(const std::int32_t* __restrict beside, std::int32_t step, int 
     }
 }
 
+// Marks the pixels of a row from which one of the four neighbours after it differs.
+RANGEEDGE_WIDE void mark_borders(const int* __restrict own, int stride, int n, std::uint8_t* __restrict differ) {
+    const int* const below = own + stride;
+    for (int k = 0; k < n; ++k) {
+        const int a = own[k];
+        differ[k] = ((a ^ own[k + 1]) | (a ^ below[k - 1]) | (a ^ below[k]) | (a ^ below[k + 1])) != 0;
+    }
+}
+
+// Calls visit(k) where a mark is set; marks are followed by eight more bytes.
+template <class F>
+void for_marked(const std::uint8_t* marks, int n, F&& visit) {
+    std::uint64_t eight;
+    for (int k = 0; k < n; k += static_cast<int>(sizeof eight)) {
+        std::memcpy(&eight, marks + k, sizeof eight);
+        if (!eight) continue;
+        for (int i = k; i < std::min(k + static_cast<int>(sizeof eight), n); ++i)
+            if (marks[i]) visit(i);
+    }
+}
+
 struct Pass {
     std::int32_t level;  // bits of its distance
-    int a, b;            // summits on either side, in order of index
+    int a, b;            // summits on either side, by number; a < b
 
     bool same_sides(const Pass& other) const { return a == other.a && b == other.b; }
 };
@@ -59,12 +91,10 @@ public:
                   Team& team)
         : rows_(rows), cols_(cols), wrap_(wrap), team_(team), level_((rows + 2) * stride(), 0) {
         parallel_for(rows, team, [&](int first, int last, int) {
-            for (int row = first; row < last; ++row)
-                for (int col = 0; col < cols; ++col) {
-                    const int k = row * cols + col;
-                    const bool exists = distance[k] > 0 && !(distance[k] < lowest) && (!mask || mask[k]);
-                    level_[index(row, col)] = exists ? bits_of(distance[k]) : 0;
-                }
+            for (int row = first; row < last; ++row) {
+                const std::ptrdiff_t begin = static_cast<std::ptrdiff_t>(row) * cols;
+                keep_levels(distance + begin, mask ? mask + begin : nullptr, cols, lowest, &level_[index(row, 0)]);
+            }
         });
         copy_around(level_);
     }
@@ -86,7 +116,12 @@ public:
     // Of two pixels of one distance, that of lower index is the higher.
     bool higher(int p, int q) const { return level_[p] > level_[q] || (level_[p] == level_[q] && p < q); }
 
-    Array<int> basins() const;
+    // The number of every pixel's summit, -1 of no pixel; and all summits in raster order.
+    struct Basins {
+        Array<int> summit;
+        std::vector<int> summits;
+    };
+    Basins basins() const;
     std::vector<Pass> passes(const Array<int>& summit) const;
     template <class F>
     void for_pixels(int first, int last, F&& visit) const {
@@ -119,12 +154,17 @@ private:
     Array<std::int32_t> level_;  // bits of distances
 };
 
-// The summit of every pixel.
-Array<int> DistanceImage::basins() const {
-    Array<int> uphill(level_.size(), 0);
+DistanceImage::Basins DistanceImage::basins() const {
+    Basins basins{Array<int>(level_.size(), 0), {}};
+    Array<int>& uphill = basins.summit;
     const auto around = neighbours();
-    // A row at a time, without branches, so that many pixels are compared at once.
-    parallel_for(rows_, team_, [&](int first, int last, int) {
+    // Of every thread, in raster order: summits, and pixels from which the way leads into another band.
+    struct Found {
+        std::vector<int> summits, exits;
+    };
+    std::vector<Found> found(static_cast<std::size_t>(team_.size()));
+    parallel_for(rows_, team_, [&](int first, int last, int thread) {
+        // A row at a time, without branches, so that many pixels are compared at once.
         std::vector<std::int32_t> top(static_cast<std::size_t>(cols_));
         for (int row = first; row < last; ++row) {
             const int begin = index(row, 0);
@@ -139,40 +179,85 @@ Array<int> DistanceImage::basins() const {
             if (!wrap_) continue;
             for (const int k : {0, cols_ - 1}) to[k] = highest_around(begin + k);  // of copies the index is another
         }
-    });
-    // Ways are shortened while they are followed.
-    for_pixels(0, rows_, [&](int p) {
-        int q = p;
-        while (uphill[q] != q) q = uphill[q] = uphill[uphill[q]];
-        uphill[p] = q;
-    });
-    copy_around(uphill);
-    return uphill;
-}
-
-// The highest pass between any two basins that touch, the highest first.
-std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
-    std::vector<std::vector<Pass>> found(static_cast<std::size_t>(team_.size()));
-    const std::array<int, 4> forward{1, stride() - 1, stride(), stride() + 1};
-    parallel_for(rows_, team_, [&](int first, int last, int thread) {
-        auto& passes = found[static_cast<std::size_t>(thread)];
-        for_pixels(first, last, [&](int p) {
-            if (((summit[p] ^ summit[p + 1]) | (summit[p] ^ summit[p + stride() - 1]) |
-                 (summit[p] ^ summit[p + stride()]) | (summit[p] ^ summit[p + stride() + 1])) == 0)
-                return;
-            for (const int step : forward) {
-                const int a = summit[p], b = summit[p + step];
-                if (a == b || !(level_[p + step] > 0)) continue;
-                const Pass pass{std::min(level_[p], level_[p + step]), std::min(a, b), std::max(a, b)};
-                if (!passes.empty() && passes.back().same_sides(pass))
-                    passes.back().level = std::max(passes.back().level, pass.level);
-                else
-                    passes.push_back(pass);
+        // Ways are shortened while they are followed.
+        auto& [summits, exits] = found[static_cast<std::size_t>(thread)];
+        const int band_begin = index(first, 0), band_end = index(last, 0);
+        const auto leaves = [=](int q) { return q < band_begin || q >= band_end; };
+        int* const up = uphill.data();
+        for_pixels(first, last, [&, up](int p) {
+            if (up[p] == p) {
+                summits.push_back(p);
+            } else if (leaves(up[p])) {
+                exits.push_back(p);
+            } else {
+                int q = up[p];
+                for (int next = up[q]; next != q && !leaves(next); next = up[q]) {
+                    if (!leaves(up[next])) up[q] = up[next];
+                    q = next;
+                }
+                up[p] = q;
             }
         });
     });
+    for (const Found& of_thread : found) {
+        basins.summits.insert(basins.summits.end(), of_thread.summits.begin(), of_thread.summits.end());
+        for (const int p : of_thread.exits) {
+            int q = p;
+            while (uphill[q] != q) q = uphill[q] = uphill[uphill[q]];
+            uphill[p] = q;
+        }
+    }
+    const std::unique_ptr<int[]> number(new int[static_cast<std::size_t>(uphill.size())]);  // at summits alone
+    for (std::size_t k = 0; k < basins.summits.size(); ++k)
+        number[static_cast<std::size_t>(basins.summits[k])] = static_cast<int>(k);
+    Array<int> summit(level_.size(), -1);
+    parallel_for(rows_, team_, [&](int first, int last, int) {
+        for_pixels(first, last, [&](int p) { summit[p] = number[static_cast<std::size_t>(uphill[uphill[p]])]; });
+    });
+    copy_around(summit);
+    uphill.swap(summit);
+    return basins;
+}
+
+// The highest pass between any two basins that touch, and some lower ones; the highest first.
+std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
+    struct Found {
+        std::vector<Pass> passes;
+        std::array<std::size_t, 256> recent{};  // places of passes found lately, by their sides
+    };
+    std::vector<Found> found(static_cast<std::size_t>(team_.size()));
+    const std::array<int, 4> forward{1, stride() - 1, stride(), stride() + 1};
+    parallel_for(rows_, team_, [&](int first, int last, int thread) {
+        auto& [passes, recent] = found[static_cast<std::size_t>(thread)];
+        const auto add = [&passes = passes, &recent = recent](const Pass& pass) {
+            const auto slot =
+                (31 * static_cast<std::size_t>(pass.a) + static_cast<std::size_t>(pass.b)) % recent.size();
+            const std::size_t k = recent[slot];
+            if (k < passes.size() && passes[k].same_sides(pass)) {
+                passes[k].level = std::max(passes[k].level, pass.level);
+            } else {
+                recent[slot] = passes.size();
+                passes.push_back(pass);
+            }
+        };
+        std::vector<std::uint8_t> differ(static_cast<std::size_t>(cols_) + sizeof(std::uint64_t));
+        for (int row = first; row < last; ++row) {
+            Watch::checkpoint();
+            const int begin = index(row, 0);
+            mark_borders(&summit[begin], stride(), cols_, differ.data());
+            for_marked(differ.data(), cols_, [&](int col) {
+                const int p = begin + col, a = summit[p];
+                if (a < 0) return;
+                for (const int step : forward) {
+                    const int b = summit[p + step];
+                    if (a == b || b < 0) continue;
+                    add({std::min(level_[p], level_[p + step]), std::min(a, b), std::max(a, b)});
+                }
+            });
+        }
+    });
     std::vector<Pass> all;
-    for (const auto& passes : found) all.insert(all.end(), passes.begin(), passes.end());
+    for (const Found& of_thread : found) all.insert(all.end(), of_thread.passes.begin(), of_thread.passes.end());
     Checkpoints checkpoints;
     std::sort(all.begin(), all.end(), [&](const Pass& m, const Pass& n) {
         checkpoints.pass();
@@ -182,22 +267,16 @@ std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
 }
 
 // Summits that count by themselves.
-std::vector<int> peaks(const DistanceImage& image, const Array<int>& summit, float separation) {
-    std::vector<int> summits;
-    image.for_pixels(0, image.rows(), [&](int p) {
-        if (summit[p] == p) summits.push_back(p);
-    });
+std::vector<int> peaks(const DistanceImage& image, const DistanceImage::Basins& basins, float separation) {
     // Islands are known by the number of their highest summit, in raster order.
+    const std::vector<int>& summits = basins.summits;
     DisjointSets islands(static_cast<int>(summits.size()));
-    const auto number = [&](int p) {
-        return static_cast<int>(std::lower_bound(summits.begin(), summits.end(), p) - summits.begin());
-    };
     const auto at = [&](int i) { return summits[static_cast<std::size_t>(i)]; };
     std::vector<int> found;
     Checkpoints checkpoints;
-    for (const Pass& pass : image.passes(summit)) {
+    for (const Pass& pass : image.passes(basins.summit)) {
         checkpoints.pass();
-        int low = islands.find(number(pass.a)), high = islands.find(number(pass.b));
+        int low = islands.find(pass.a), high = islands.find(pass.b);
         if (low == high) continue;
         if (image.higher(at(low), at(high))) std::swap(low, high);
         if (value_of(pass.level) < separation * image[at(low)]) found.push_back(at(low));
@@ -214,40 +293,50 @@ int extract_seeds(const float* distance, const std::uint8_t* mask, int height, i
                   float separation, int threads, std::int32_t* markers) {
     Team team(threads);
     const DistanceImage image(distance, mask, height, width, wrap, separation * min_distance, team);
-    // Flood every seed from its peak.
-    Array<int> seed(image.size(), 0);
-    std::vector<int> stack;
-    int seeds = 0;
-    Checkpoints checkpoints;
-    for (const int peak : peaks(image, image.basins(), separation)) {
-        if (image[peak] < min_distance) continue;
+    std::vector<int> wanted;
+    for (const int peak : peaks(image, image.basins(), separation))
+        if (!(image[peak] < min_distance)) wanted.push_back(peak);
+    const int seeds = static_cast<int>(wanted.size());
+    // Flood every seed from its peak. As they never touch, this may happen at once.
+    Array<int> seed(image.size(), 0), first(seeds);
+    parallel_each(seeds, team, [&](int s, int) {
+        const int peak = wanted[static_cast<std::size_t>(s)];
         // Where all is infinitely far, or `separation` vanishes in single precision, nothing but no pixel is too low.
         const float share = separation * image[peak];
         const std::int32_t least = bits_of(share > 0 ? share : std::numeric_limits<float>::denorm_min());
-        seed[peak] = ++seeds;
-        stack.assign(1, peak);
+        const auto around = image.neighbours();
+        seed[peak] = s + 1;
+        std::vector<int> stack(1, peak);
+        int lowest = peak;
+        Checkpoints checkpoints;
         while (!stack.empty()) {
             checkpoints.pass();
             const int p = stack.back();
             stack.pop_back();
-            for (const int step : image.neighbours()) {
+            lowest = std::min(lowest, p);
+            for (const int step : around) {
                 const int q = image.own(p + step);
                 if (!image.reaches(q, least) || seed[q]) continue;
-                seed[q] = seeds;
+                seed[q] = s + 1;
                 stack.push_back(q);
             }
         }
-    }
-    // Number them.
+        first[s] = lowest;
+    });
+    // Number them by their first pixels.
     Array<int> number(seeds + 1, 0);
-    int count = 0;
-    for (int row = 0; row < height; ++row)
-        for (int col = 0; col < width; ++col) {
-            const int own = seed[image.index(row, col)];
-            if (own && !number[own]) number[own] = ++count;
-            markers[row * width + col] = number[own];
+    std::vector<int> order(wanted.size());
+    for (int s = 0; s < seeds; ++s) order[static_cast<std::size_t>(s)] = s;
+    std::sort(order.begin(), order.end(), [&](int a, int b) { return first[a] < first[b]; });
+    for (int n = 0; n < seeds; ++n) number[order[static_cast<std::size_t>(n)] + 1] = n + 1;
+    parallel_for(height, team, [&](int begin, int end, int) {
+        for (int row = begin; row < end; ++row) {
+            const int* const own = &seed[image.index(row, 0)];
+            std::int32_t* const to = markers + static_cast<std::ptrdiff_t>(row) * width;
+            for (int col = 0; col < width; ++col) to[col] = number[own[col]];
         }
-    return count;
+    });
+    return seeds;
 }
 
 }  // namespace rangeedge

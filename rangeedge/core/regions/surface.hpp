@@ -57,6 +57,19 @@ public:
         square_ += w * f * f;
         ++count_;
     }
+    // n samples of a column at x, of which the sums over v = y - y0 and f = ordinate - base are known: of w v^0 ... w v^4,
+    // of w f v^0 ... w f v^2, and of w f^2.
+    void add_column(double x, int n, const std::array<double, 5>& w, const std::array<double, 3>& wf, double wff) {
+        const double u = x - x0_, uu = u * u, uuu = u * uu;
+        power_[0] += w[0], power_[1] += u * w[0], power_[2] += w[1], power_[3] += uu * w[0], power_[4] += u * w[1];
+        power_[5] += w[2], power_[6] += uuu * w[0], power_[7] += uu * w[1], power_[8] += u * w[2], power_[9] += w[3];
+        power_[10] += uu * uu * w[0], power_[11] += uuu * w[1], power_[12] += uu * w[2], power_[13] += u * w[3];
+        power_[14] += w[4];
+        product_[0] += wf[0], product_[1] += u * wf[0], product_[2] += wf[1];
+        product_[3] += uu * wf[0], product_[4] += u * wf[1], product_[5] += wf[2];
+        square_ += wff;
+        count_ += n;
+    }
     // The samples of another set, too.
     void add(const SurfaceSums& other);
 

@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "base/simd.hpp"
+
 namespace rangeedge {
 namespace {
 
@@ -20,8 +22,9 @@ struct Range {
 }  // namespace
 
 SurfaceImage::SurfaceImage(const RangeMap& map, double lateral, Team& team)
-    : rows_(map.rows), cols_(map.cols), projective_(map.projective), lateral_(lateral), offset_(map.offset),
-      to_plane_(map.to_plane), pixel_(new Pixel[static_cast<std::size_t>(size())]), state_(size(), none) {
+    : rows_(map.rows), cols_(map.cols), projective_(map.projective), regular_(!map.x && !map.y), lateral_(lateral),
+      offset_(map.offset), to_plane_(map.to_plane), pixel_(new Pixel[static_cast<std::size_t>(size())]),
+      state_(size(), none) {
     Array<Range> ranges(team.size());
     parallel_for(rows_ * cols_, team, [&](int begin, int end, int thread) {
         Range& range = ranges[thread];
@@ -87,6 +90,29 @@ SurfaceSums SurfaceImage::sums_of(const Pixels& pixels) const {
         sums.add(sample(p));
     }
     return sums;
+}
+
+RANGEEDGE_WIDE void SurfaceImage::sum_columns(int first, int rows, int n, const double* base,
+                                              const ColumnSums& sums) const {
+    double *const w0 = sums.w[0], *const w1 = sums.w[1], *const w2 = sums.w[2], *const w3 = sums.w[3],
+                  *const w4 = sums.w[4], *const f0 = sums.wf[0], *const f1 = sums.wf[1], *const f2 = sums.wf[2],
+                  *const ff = sums.wff;
+    for (double* const sum : {w0, w1, w2, w3, w4, f0, f1, f2, ff}) std::fill_n(sum, n, 0.0);
+    std::fill_n(sums.closed, n, std::uint8_t{0});
+    for (int row = 0; row < rows; ++row) {
+        const Pixel* const pixel = &at(first + row * stride());
+        const std::uint8_t* const state = &state_[first + row * stride()];
+        const double v = row - rows / 2, vv = v * v, vvv = v * vv, vvvv = vv * vv;
+        RANGEEDGE_INDEPENDENT
+        for (int k = 0; k < n; ++k) {
+            const double w = 1 / static_cast<double>(pixel[k].variance);
+            const double f = static_cast<double>(pixel[k].ordinate) - base[k], wf = w * f;
+            w0[k] += w, w1[k] += w * v, w2[k] += w * vv, w3[k] += w * vvv, w4[k] += w * vvvv;
+            f0[k] += wf, f1[k] += wf * v, f2[k] += wf * vv, ff[k] += wf * f;
+        }
+        RANGEEDGE_INDEPENDENT
+        for (int k = 0; k < n; ++k) sums.closed[k] = static_cast<std::uint8_t>(sums.closed[k] | (state[k] != plain));
+    }
 }
 
 bool SurfaceImage::is_flat(const Surface& surface) const { return surface.rms <= flat * correlation_; }

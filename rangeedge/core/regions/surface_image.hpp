@@ -102,6 +102,16 @@ public:
     };
     Continuation continuation(int p, int q, const Surface& a, const Surface& b) const;
 
+    // Whether x and y are columns and rows.
+    bool regular() const { return regular_; }
+    // Sums down the columns of some rows, of which samples have v = -rows / 2, ... and f = ordinate - base; for each of
+    // n columns. Where a pixel is not open a sum says nothing, and `closed` is set.
+    struct ColumnSums {
+        double *w[5], *wf[3], *wff;
+        std::uint8_t* closed;
+    };
+    void sum_columns(int first, int rows, int n, const double* base, const ColumnSums& sums) const;
+
 private:
     enum State : std::uint8_t { none, edge_pixel, plain };
     struct Pixel {
@@ -115,7 +125,7 @@ private:
     std::array<double, 3> normal(const Surface& s, double x, double y) const;
 
     int rows_, cols_;
-    bool projective_;
+    bool projective_, regular_;
     double lateral_, offset_, unit_ = 1, correlation_ = 1, correlation_area_ = 1;
     std::array<double, 6> to_plane_;
     std::unique_ptr<Pixel[]> pixel_;

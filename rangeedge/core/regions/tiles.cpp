@@ -75,6 +75,36 @@ SurfaceSums Tiles::add_up(int t) const {
     return sums;
 }
 
+// Columns first, many at once, then those of each tile.
+void Tiles::add_up_row(int row, SurfaceSums* sums) const {
+    if (!image_.regular()) {
+        for (int col = 0; col < cols_; ++col) sums[col] = add_up(index(row, col));
+        return;
+    }
+    const int n = cols_ * side_, first = image_.index(row * side_, 0);
+    Array<double> values(10 * n);
+    Array<std::uint8_t> closed(n);
+    const auto part = [&](int k) { return values.data() + static_cast<std::ptrdiff_t>(k) * n; };
+    double* const base = part(9);
+    const auto middle = [&](int col) { return image_.sample(first + col * side_ + side_ / 2 * (image_.stride() + 1)); };
+    for (int col = 0; col < cols_; ++col) std::fill_n(base + col * side_, side_, middle(col).ordinate);
+    const SurfaceImage::ColumnSums columns{
+        {part(0), part(1), part(2), part(3), part(4)}, {part(5), part(6), part(7)}, part(8), closed.data()};
+    image_.sum_columns(first, side_, n, base, columns);
+    for (int col = 0; col < cols_; ++col) {
+        const int begin = col * side_, end = begin + side_;
+        sums[col] = {};
+        if (std::any_of(closed.begin() + begin, closed.begin() + end, [](std::uint8_t c) { return c != 0; })) continue;
+        const Sample m = middle(col);
+        sums[col] = SurfaceSums(m.x, m.y, m.ordinate);
+        for (int k = begin; k < end; ++k) {
+            const auto& [w, wf, wff, unused] = columns;
+            sums[col].add_column(k, side_, {w[0][k], w[1][k], w[2][k], w[3][k], w[4][k]},
+                                 {wf[0][k], wf[1][k], wf[2][k]}, wff[k]);
+        }
+    }
+}
+
 void Tiles::set(int t, const SurfaceSums& sums) {
     open_[t] = 1;
     mean_[t] = sums.mean_ordinate() * std::sqrt(sums.weight() / sums.count());
@@ -87,11 +117,10 @@ TilePyramid::TilePyramid(const SurfaceImage& image, Team& team) : large(image, 8
     parallel_for((small.rows() + 1) / 2, team, [&](int first, int last, int) {
         Array<SurfaceSums> quarters(2 * small.cols());
         for (int row = first; row < last; ++row) {
-            for (int k = 0; k < 2 * small.cols(); ++k) {
-                const int t = 2 * row * small.cols() + k;
-                quarters[k] = t < small.count() ? small.add_up(t) : SurfaceSums();
-                if (quarters[k].count()) small.set(t, quarters[k]);
-            }
+            const int two = std::min(2, small.rows() - 2 * row);
+            for (int k = 0; k < two; ++k) small.add_up_row(2 * row + k, &quarters[k * small.cols()]);
+            for (int k = 0; k < two * small.cols(); ++k)
+                if (quarters[k].count()) small.set(2 * row * small.cols() + k, quarters[k]);
             for (int col = 0; row < large.rows() && col < large.cols(); ++col) {
                 const int above = 2 * col, below = above + small.cols();
                 SurfaceSums sums = quarters[above];

@@ -28,6 +28,8 @@ public:
 
     // Sums of the pixels of a tile, none if it is not open.
     SurfaceSums add_up(int t) const;
+    // The same of a whole row of tiles.
+    void add_up_row(int row, SurfaceSums* sums) const;
     // Notes that a tile has these sums, and keeps them if `keep` was called before.
     void set(int t, const SurfaceSums& sums);
     void keep() { sums_.resize(open_.size()); }

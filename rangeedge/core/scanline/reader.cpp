@@ -41,13 +41,6 @@ void inverse_of(const Deviation& tolerance, bool projective, const float* y, int
     invert_deviations(tolerance, projective, y, n, result);
 }
 
-// A direction across the axis: that of x, where that is none along it.
-Vector across(const Vector& axis) {
-    Vector right{1, 0, 0};
-    right = combination(right, -dot(axis, right), axis);
-    return normalise(right) ? right : Vector{0, 1, 0};
-}
-
 }  // namespace
 
 int line_count(int direction, int rows, int cols) {

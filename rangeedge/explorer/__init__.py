@@ -1,0 +1,1 @@
+"""The explorer: parameters by sliders, with all results beside each other, in the browser."""

@@ -1,0 +1,225 @@
+"""What the explorer explores: an image, its geometry, the parameters, and the pictures of the results."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from .._check import described, error
+from .._option import parsed
+from ..chains import linkEdges
+from ..constants import SALIENCE_ADDITIVE
+from ..detector import createScanLineDetector, run_detector
+from ..distance import distanceTransform, salienceDistanceTransform
+from ..draw import colorizeDistance, drawChains, drawEdges, drawRegions
+from ..edges import EdgeStrength
+from ..explain import Explanation, explain
+from ..io import RangeImage, imreadRange
+from ..noise import measured_frame
+from ..options import DETECTION, GEOMETRY, Growing, ScanLineParams, Selection
+from ..regions import seeded_regions
+from ..selection import overallStrength, strengthImage
+
+SLIDERS = {  # name: least, largest, step
+    "jumpThreshold": (0.0, 1.0, 0.005),
+    "creaseThreshold": (0.0, 90.0, 1.0),
+    "hysteresis": (0.1, 1.0, 0.05),
+    "minLength": (1, 60, 1),
+    "lineSignificance": (0.0, 60.0, 1.0),
+    "minSignificance": (0.0, 30.0, 0.5),
+    "epsFactor": (0.5, 20.0, 0.5),
+    "mergeSignificance": (0.0, 10.0, 0.5),
+    "maxGap": (0, 60, 1),
+    "maxShift": (0.0, 10.0, 0.5),
+}
+SWITCHES = ("boundaryEdges", "dynamic", "shadowEdges")
+
+
+class Session:
+    """One user's image and parameters."""
+
+    def __init__(self, image: RangeImage, title: str) -> None:
+        self.title = title
+        self.options: dict[str, Any] = {}
+        self.use(image)
+
+    @classmethod
+    def of_file(cls, path: str | os.PathLike[str], **geometry: Any) -> Session:
+        """Of an image that is a file here."""
+        return cls(imreadRange(path).withGeometry(**geometry), Path(path).name)
+
+    @classmethod
+    def of_scene(cls) -> Session:
+        """Of the scene of `rangeedge demo`."""
+        from ..app.demo import RenderedScene
+
+        scene = RenderedScene()
+        return cls(RangeImage(scene.src, scene.geometry), scene.title)
+
+    def use(self, image: RangeImage) -> None:
+        """Take an image; on an error everything stays as it was."""
+        params, _ = parsed({**image.geometry, **self.options}, ScanLineParams, Selection)
+        frame = measured_frame(image.src, params)
+        self.image, self.noise, self._frame = image, frame.noise, frame
+        self._results = Results(frame, params, Selection(**self._own(Selection)))
+        self.relief = drawEdges(image.src, np.zeros(frame.shape, np.uint8), **self.geometry)
+
+    def upload(self, name: str, content: bytes) -> None:
+        """Take what a user has dropped."""
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"image{Path(name).suffix}"
+            path.write_bytes(content)
+            image = imreadRange(path)
+            known = {n: v for n, v in self.image.geometry.items() if n in ("K", "depthFactor") and image.src.ndim == 2}
+            self.use(image if image.geometry else image.withGeometry(**known) if _fits(image, self.image) else image)
+        self.title = name
+
+    def place(self, camera: str, pixel_size: str, *, height_map: bool) -> None:
+        """Take a geometry as it is typed; on an error it stays as it was."""
+        given: dict[str, Any] = {}
+        if camera.strip():
+            given["K"] = _numbers(camera)
+        elif pixel_size.strip():
+            sizes = _numbers(pixel_size)
+            given["pixelSize"] = sizes[0] if len(sizes) == 1 else sizes
+        if height_map:
+            given["heightMap"] = True
+        kept = {n: v for n, v in self.image.geometry.items() if n in ("depthFactor", "invalid")}
+        self.use(RangeImage(self.image.src, {**kept, **given}))
+
+    def change(self, name: str, value: Any) -> None:
+        """Set a parameter."""
+        default = DETECTION[name].default
+        if value == default or (name == "jumpThreshold" and not value):
+            self.options.pop(name, None)
+        else:
+            self.options[name] = value
+        params, selection = parsed({**self.geometry, **self.options}, ScanLineParams, Selection)
+        self._results = Results(self._frame.with_noise(self.noise), params, selection)
+
+    @property
+    def geometry(self) -> dict[str, Any]:
+        """How the image was taken."""
+        return {name: value for name, value in self.image.geometry.items() if name in GEOMETRY}
+
+    def value(self, name: str) -> Any:
+        """What a parameter is."""
+        value = self.options.get(name, DETECTION[name].default)
+        return 0.0 if value is None else value
+
+    def picture(self, view: str) -> np.ndarray:
+        """One of `VIEWS`, as large as the image."""
+        return VIEWS[view](self, self._results)
+
+    def edge_count(self) -> int:
+        """How many pixels are edges."""
+        return int(np.count_nonzero(self._results.edges))
+
+    def explanation(self, x: int, y: int) -> Explanation:
+        """Why a pixel is an edge or none."""
+        results = self._results
+        return explain(results.frame, results.params, results.selection, x, y, 24)
+
+    def python(self) -> str:
+        """The parameters as a program."""
+        given = {**self.geometry, **self.options}
+        words = [f"    {name}={_written(value)},\n" for name, value in given.items()]
+        read = f'src = rangeedge.imreadRange("{self.title}").src\n'
+        return f"import rangeedge\n\n{read}edges = rangeedge.detectEdges(\n    src,\n{''.join(words)})\n"
+
+    def settings(self) -> bytes:
+        """The parameters as a file that `ScanLineDetector.load` takes."""
+        detector = createScanLineDetector()
+        for name, value in {**self.geometry, **self.options}.items():
+            getattr(detector, f"set{name[0].upper()}{name[1:]}")(value)
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "detector.yml"
+            detector.save(path)
+            return path.read_bytes()
+
+    def _own(self, kind: Any) -> dict[str, Any]:
+        return {name: value for name, value in self.options.items() if name in kind.options}
+
+
+class Results:
+    """What follows from the parameters, each computed when it is looked at."""
+
+    def __init__(self, frame: Any, params: ScanLineParams, selection: Selection) -> None:
+        self.frame, self.params, self.selection = frame, params, selection
+
+    @cached_property
+    def found(self) -> tuple[np.ndarray, EdgeStrength]:
+        return run_detector(self.frame, self.params, self.selection)
+
+    @property
+    def edges(self) -> np.ndarray:
+        return self.found[0]
+
+    @property
+    def strength(self) -> EdgeStrength:
+        return self.found[1]
+
+    @cached_property
+    def distance(self) -> np.ndarray:
+        return distanceTransform(self.edges)
+
+    @cached_property
+    def salience(self) -> np.ndarray:
+        jump = self.strength.jump
+        cut = float(np.median(jump[jump > 0])) if jump.any() else 1.0
+        return overallStrength(jump, self.strength.crease, cut)
+
+    @cached_property
+    def regions(self) -> tuple[np.ndarray, np.ndarray]:
+        return seeded_regions(self.frame, self.edges, Growing())
+
+
+def _edges(session: Session, results: Results) -> np.ndarray:
+    return drawEdges(session.relief, results.edges, results.strength.kind)
+
+
+def _chains(session: Session, results: Results) -> np.ndarray:
+    options = {**session.geometry, **session.options, "noise": session.noise}
+    return drawChains(session.relief, linkEdges(session.image.src, **options))
+
+
+VIEWS: Mapping[str, Callable[[Session, Results], np.ndarray]] = {
+    "depth": lambda session, _: session.relief,
+    "edges": _edges,
+    "kinds": lambda session, r: drawEdges(session.relief // 3, r.strength.kind, r.strength.kind),
+    "crease": lambda _, r: cv2.cvtColor(strengthImage(r.strength.crease, 64), cv2.COLOR_GRAY2BGR),
+    "thin map": lambda _, r: cv2.cvtColor(r.edges, cv2.COLOR_GRAY2BGR),
+    "distance": lambda _, r: colorizeDistance(r.distance),
+    "salience": lambda _, r: colorizeDistance(
+        salienceDistanceTransform(r.salience, SALIENCE_ADDITIVE, lambda_=20), log=True
+    ),
+    "seeds": lambda session, r: drawRegions(r.regions[0], session.relief, 0.9),
+    "regions": lambda session, r: drawRegions(r.regions[1], session.relief, 0.7),
+    "chains": _chains,
+}
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(word) for word in text.replace(",", " ").split()]
+    except ValueError:
+        raise error(f"must be numbers, got {text!r}") from None
+
+
+def _fits(image: RangeImage, other: RangeImage) -> bool:
+    """Whether an image without a geometry may be by the camera of another."""
+    return image.src.shape[:2] == other.src.shape[:2] and image.src.dtype == other.src.dtype
+
+
+def _written(value: Any) -> str:
+    """A value as a program has it."""
+    if isinstance(value, np.ndarray):
+        return repr(value.tolist())
+    return repr(value) if isinstance(value, (bool, int, float, str, tuple, list, type(None))) else described(value)

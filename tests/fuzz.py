@@ -1,0 +1,328 @@
+"""Calls of every public function with arrays and options of all kinds: what comes is an answer or `rangeedge.error`.
+
+    python tests/fuzz.py --minutes 60
+
+runs until the time is up or a call breaks the rules, which it then prints, made as small as possible; a build with
+sanitizers (CONTRIBUTING.md) finds more. `pytest tests/test_fuzz.py` makes a few of the same calls.
+
+Rules: no exception but `rangeedge.error`; no warning but `RangeEdgeWarning`; inputs as they were; the same answer, bit
+for bit, from a second call with another number of threads; a `dst` that fits is returned, any other left alone.
+"""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import os
+import subprocess
+import sys
+import time
+import traceback
+import warnings
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+import rangeedge
+from rangeedge import evaluation
+
+TINY, LARGE = 5e-324, 1.7e308
+BUNCH = 40  # calls, after which the time is looked at
+PACKAGE = str(Path(rangeedge.__file__).parent)
+NUMBERS = [
+    *(0, 1, -1, 2, 3, 8, 30, 64, 255, 1000, 2**31 - 1, 2**31, 2**63, -(2**63), 10**400),
+    *(0.0, -0.0, 0.1, 0.5, 0.9, 1e-3, 1e-6, 1e-30, 1e-38, 1e-45, 1e-60, 1e-300, TINY),
+    *(1e6, 1e30, 1e38, 1e39, 1e300, LARGE),
+    *(np.inf, -np.inf, np.nan, np.float32(0.25), np.int8(3), np.uint64(7), np.float16(2), True, False),
+]  # fmt: skip
+ODD = [None, "", "x", b"x", (), [], {}, object(), 1j, (1, 2), [[1], [2, 3]], np.zeros(0), np.array("x"), np.float32]
+DTYPES = ["u1", "?", "u2", "i2", "i4", "u4", "i8", "f2", "f4", "f8", "g"]
+SHAPES = [(1, 1), (1, 7), (9, 1), (2, 2), (3, 5), (16, 16), (24, 33), (33, 24), (64, 80), (7, 120)]
+
+values = st.sampled_from(NUMBERS)
+seeds = st.integers(0, 2**16)
+
+
+def content(shape: tuple[int, ...], kind: str, rng: np.random.Generator) -> np.ndarray:
+    """Numbers of an image in double precision."""
+    v, u = np.indices(shape[:2])
+    plane = 2 + 0.01 * u + 0.02 * v
+    image = {
+        "constant": np.ones(shape[:2]),
+        "zero": np.zeros(shape[:2]),
+        "plane": plane,
+        "step": plane + (u > shape[1] // 2),
+        "roof": 3 - 0.1 * np.abs(u - shape[1] / 2),
+        "noise": rng.normal(1, 0.1, shape[:2]),
+        "checkers": 1.0 + (u + v) % 2,
+        "alternating": (-1.0) ** (u + v) * (1 + u + v),
+        "labels": (u // 4 + 8 * (v // 4)) % 23,
+        "binary": (rng.random(shape[:2]) < 0.2) * 255,
+        "extreme": rng.choice([0, 1, -1, TINY, 1e-300, 1e-40, 1e38, 1e300, LARGE, np.inf, -np.inf, np.nan], shape[:2]),
+        "far": plane + (u > shape[1] // 2) * 0.01 + 5e5,
+        "small": plane * 1e-200,
+        "large": plane * 1e200,
+        "nothing": np.full(shape[:2], np.nan),
+    }[kind].astype(float)
+    if len(shape) == 3:
+        with np.errstate(all="ignore"):
+            image = np.stack(
+                [(u - shape[1] / 2) * image, (v - shape[0] / 2) * image, image, image][: shape[2]], axis=-1
+            )
+    return image
+
+
+KINDS = ["constant", "zero", "plane", "step", "roof", "noise", "checkers", "alternating", "labels", "binary", "extreme"]
+KINDS += ["far", "small", "large", "nothing"]
+
+
+def laid_out(array: np.ndarray, layout: str) -> np.ndarray:
+    """The same numbers elsewhere in memory."""
+    if layout == "fortran":
+        return np.asfortranarray(array)
+    if layout == "reversed":
+        return np.ascontiguousarray(array[::-1, ::-1])[::-1, ::-1]
+    if layout == "strided":
+        return np.repeat(np.repeat(array, 2, axis=0), 3, axis=1)[::2, ::3]
+    if layout == "swapped":
+        return array.astype(array.dtype.newbyteorder())
+    if layout == "unaligned":
+        raw = np.empty(array.nbytes + 1, np.uint8)[1:]
+        raw[:] = np.frombuffer(array.tobytes(), np.uint8)
+        return raw.view(array.dtype).reshape(array.shape)
+    array = np.ascontiguousarray(array)
+    array.flags.writeable = layout != "readonly"
+    return array
+
+
+LAYOUTS = ["plain", "plain", "readonly", "fortran", "reversed", "strided", "swapped", "unaligned"]
+
+
+@st.composite
+def images(draw: Any, shape: tuple[int, int], dtypes: list[str] = DTYPES, deep: bool = False) -> np.ndarray:
+    kind, rng = draw(st.sampled_from(KINDS)), np.random.default_rng(draw(seeds))
+    if deep and draw(st.booleans()):
+        shape = (*shape, draw(st.sampled_from([3, 4])))
+    image = content(shape, kind, rng)
+    if draw(st.booleans()):
+        image[rng.random(shape[:2]) < 0.1] = np.nan
+    dtype = np.dtype(draw(st.sampled_from(dtypes)))
+    scale, layout = draw(st.sampled_from([1, 1000])), draw(st.sampled_from(LAYOUTS))
+    with np.errstate(all="ignore"):
+        if dtype.kind in "iu":
+            image = np.clip(np.nan_to_num(image * scale), 0, np.iinfo(dtype).max // 2)
+        return laid_out(image.astype(dtype), layout)
+
+
+FLAGS = {
+    "fit": [rangeedge.FIT_LSQ, rangeedge.FIT_INTERP],
+    "measure": [rangeedge.MEASURE_MIDPOINT, rangeedge.MEASURE_ENDPOINT],
+    "crease": [rangeedge.CREASE_MAX, rangeedge.CREASE_NORMAL],
+    "directions": list(range(1, 16)),
+    "method": [0, 1, 2, 3],
+    **{name: [False, True] for name in ("heightMap", "dynamic", "boundaryEdges", "wrap", "newSeeds", "log", "lengths")},
+}
+CAMERAS = [(50, 50, 16, 12), (1e-3, 1e3, 0, 0), (1e300, 1e-300, 0, 0), [[60, 2, 9], [0, 60, 9], [0, 0, 1]]]
+GIVEN = {
+    "K": CAMERAS,
+    "distCoeffs": [[0.1, -0.2, 0.001, 0.002], np.zeros(5), [1e300] * 8],
+    "pixelSize": [(1, 2), 0.5, (1e-200, 1e200), (1e300, 1e300), 1e-45],
+    "origin": [(0, 0, 0), (1, 2, 3), (1e300, 0, 0)],
+    "invalid": [0, (1, 2), (0, (5, 9)), np.nan],
+    "noise": [0.01, 1e-4, rangeedge.NoiseModel(0.01, 0, 1e-3), rangeedge.NoiseModel(1e-300, 0, 1e300)],
+    "scale": [1, 2, 3],
+    "title": ["", "x\udcff", "\0\n"],
+    "transform": [(0, 1, 0, 0, 0, 1)],
+    "elevation": [np.linspace(-0.2, 0.2, 16), (-0.2, 0.2)],
+    "azimuth": [(0, 6.28)],
+}
+MASKS = ("mask", "edges", "barrier", "kind", "ignore", "thin")
+DEEP = ("src", "points")
+LABELS = ("labels", "markers", "truth")
+
+
+@st.composite
+def arguments(draw: Any, name: str, shape: tuple[int, int]) -> Any:
+    """A value for a parameter of that name: mostly one that is meant, sometimes none that is."""
+    oddity = draw(st.integers(0, 19))
+    if oddity == 0:
+        return draw(st.sampled_from(ODD))
+    if oddity == 1:
+        return draw(images(draw(st.sampled_from(SHAPES)), deep=True))
+    if name in ("noise", "pixelSize") and oddity == 2:
+        return draw(images(shape, ["f4", "f8"]))
+    if name in FLAGS:
+        return draw(st.sampled_from(FLAGS[name]))
+    if name in GIVEN:
+        return draw(st.sampled_from(GIVEN[name])) if oddity > 3 else draw(values)
+    if name in MASKS:
+        return draw(images(shape, ["u1", "?"]))
+    if name in LABELS:
+        return draw(images(shape, ["i4"]))
+    if name in DEEP:
+        return draw(images(shape, deep=True))
+    if name in ("distance", "salience", "strength", "jump"):
+        return np.abs(draw(images(shape, ["u1", "f4", "f8"])))
+    if name == "z":
+        return draw(images((1, shape[0] * shape[1])))[0]
+    return draw(values)
+
+
+SCENE = np.where(np.arange(33) < 15, 1.0, 2.0) * np.ones((24, 1)) + 0.02 * np.arange(24)[:, None]
+STRENGTH = rangeedge.edgeStrength(SCENE)
+CHAINS = rangeedge.linkEdges(SCENE)
+SEGMENTS = rangeedge.fitSegments(CHAINS)
+MADE = {
+    ("selectEdges", "strength"): STRENGTH,
+    ("drawOverview", "strength"): STRENGTH,
+    ("fitSegments", "chains"): CHAINS,
+    ("drawChains", "chains"): CHAINS,
+    ("drawSegments", "segments"): SEGMENTS,
+    ("kindNames", "kind"): 5,
+}
+FILES = ("imreadRange", "imwriteRange", "writeLines")  # tests/test_broken_files.py is about these
+FUNCTIONS = {
+    name: function
+    for name in rangeedge.__all__
+    if inspect.isroutine(function := getattr(rangeedge, name)) and name not in FILES
+}
+FUNCTIONS |= {name: getattr(evaluation, name) for name in ("hooverScores", "baddeleyDelta", "prattFOM")}
+
+
+def destination(name: str) -> str:
+    """The parameter that takes the array to be written."""
+    return "edges" if name == "detectEdges" else "dst"
+
+
+@st.composite
+def calls(draw: Any, name: str) -> dict[str, Any]:
+    """Keyword arguments for a function: those that must be given, and a few others."""
+    shape = draw(st.sampled_from(SHAPES))
+    made = [argument for function, argument in MADE if function == name]
+    if made or name in ("drawChains", "drawSegments", "drawOverview"):
+        shape = SCENE.shape
+    parameters = inspect.signature(FUNCTIONS[name]).parameters
+    needed = [p for p in parameters if parameters[p].default is inspect.Parameter.empty]
+    optional = [p for p in parameters if p not in needed]
+    chosen = draw(st.lists(st.sampled_from(optional), max_size=4, unique=True)) if optional else []
+    given_values = {}
+    for argument in [*needed, *chosen]:
+        if argument in made and draw(st.integers(0, 9)):
+            given_values[argument] = MADE[name, argument]
+        elif argument == destination(name):
+            like = draw(st.sampled_from(["f4", "u1", "f8", "i4"]))
+            given_values[argument] = draw(
+                st.one_of(images(shape, [like]), st.sampled_from([None, "x", np.zeros((3, 3))]))
+            )
+        else:
+            given_values[argument] = draw(arguments(argument, shape))
+    return given_values
+
+
+def leaves(result: Any) -> list[Any]:
+    if isinstance(result, (tuple, list)):
+        return [leaf for part in result for leaf in leaves(part)]
+    return [result]
+
+
+def frozen(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes() if value.dtype.kind != "O" else repr(value)
+    return repr(value)
+
+
+def outcome(name: str, given_values: dict[str, Any], threads: int) -> Any:
+    cv2.setNumThreads(threads)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        warnings.simplefilter("ignore", rangeedge.RangeEdgeWarning)
+        try:
+            return FUNCTIONS[name](**given_values)
+        except rangeedge.error as problem:
+            return f"{problem.func}: {problem.err}"
+
+
+def expect_rules(name: str, given_values: dict[str, Any]) -> None:
+    """Makes a call twice and asserts that it keeps the rules."""
+    arrays = {k: v for k, v in given_values.items() if isinstance(v, np.ndarray) and k != destination(name)}
+    before = {k: frozen(v) for k, v in arrays.items()}
+    dst = given_values.get(destination(name))
+    old = frozen(dst)
+    threads = cv2.getNumThreads()
+    try:
+        first = outcome(name, given_values, 1)
+        kept = [frozen(leaf) for leaf in leaves(first)]
+        if isinstance(dst, np.ndarray) and first is not dst:
+            assert frozen(dst) == old, "a `dst` that is not returned was written"
+        second = outcome(name, given_values, 3)
+    finally:
+        cv2.setNumThreads(threads)
+    assert kept == [frozen(leaf) for leaf in leaves(second)], "the answer changes"
+    assert before == {k: frozen(v) for k, v in arrays.items()}, "an input was modified"
+
+
+def fuzz(name: str, examples: int, *, shrink: bool = False, derandomize: bool = False) -> None:
+    """Makes that many calls of a function."""
+
+    @settings(
+        max_examples=examples,
+        deadline=None,
+        database=None,
+        derandomize=derandomize,
+        suppress_health_check=list(HealthCheck),
+        phases=[Phase.generate, Phase.shrink] if shrink else [Phase.generate],
+    )
+    @given(calls(name))
+    def run(given_values: dict[str, Any]) -> None:
+        expect_rules(name, given_values)
+
+    run()
+
+
+def place(problem: BaseException) -> str:
+    """Where an exception came from: the last line of the package, and its type."""
+    frames = [f for f in traceback.extract_tb(problem.__traceback__) if "hypothesis" not in f.filename]
+    frames = [f for f in frames if PACKAGE in f.filename] or frames
+    return f"{type(problem).__name__} at {frames[-1].filename}:{frames[-1].lineno}"
+
+
+def fuzz_for(name: str, seconds: float, *, shrink: bool = False) -> int:
+    """Calls a function until the time is up; prints one call for each place where one fails, and returns how many."""
+    end, made, found = time.monotonic() + seconds, 0, set()
+    while time.monotonic() < end:
+        made += BUNCH
+        try:
+            fuzz(name, BUNCH, shrink=shrink)
+        except Exception as problem:
+            if place(problem) not in found:
+                found.add(place(problem))
+                print(f"{name}: {place(problem)}: {problem}", *getattr(problem, "__notes__", []), sep="\n", flush=True)
+    print(f"{name}: {made} calls, {len(found)} kinds of failures", flush=True)
+    return len(found)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--only", nargs="*", default=list(FUNCTIONS), choices=FUNCTIONS, metavar="FUNCTION")
+    parser.add_argument(
+        "--shrink", action="store_true", help="make calls that fail as small as possible, which takes long"
+    )
+    parser.add_argument("--files", action="store_true", help="mutated files, too")
+    options = parser.parse_args()
+    failed = sum(
+        fuzz_for(name, 60 * options.minutes / len(options.only), shrink=options.shrink) for name in options.only
+    )
+    if options.files:
+        environment = {**os.environ, "RANGEEDGE_FUZZ": "1000"}
+        files = Path(__file__).with_name("test_broken_files.py")
+        failed += subprocess.run([sys.executable, "-m", "pytest", "-q", files], env=environment, check=False).returncode
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,220 @@
+"""The explorer: what it computes, and the page in a real browser."""
+
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import rangeedge
+from rangeedge.app.cli import main
+from rangeedge.explorer.session import SLIDERS, SWITCHES, VIEWS, Session
+from rangeedge.options import DETECTION
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+FLAGS = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking"
+FLAGS += " --disable-component-update --disable-sync --window-size=1500,1100"
+
+
+@pytest.fixture
+def session():
+    return Session.of_scene()
+
+
+def test_every_view_is_a_picture_of_the_image(session):
+    for name in VIEWS:
+        picture = session.picture(name)
+        assert (picture.dtype, picture.shape) == (np.uint8, (480, 640, 3)), name
+        assert picture.std() > 1
+
+
+def test_parameters_are_those_of_the_detector(session):
+    for name, (low, high, _) in SLIDERS.items():
+        default = DETECTION[name].default
+        assert default is None or low <= default <= high
+        session.change(name, high)
+    for name in SWITCHES:
+        session.change(name, not DETECTION[name].default)
+    src, geometry = session.image
+    options = {name: value for name, value in session.options.items()}
+    assert len(options) == len(SLIDERS) + len(SWITCHES) - 1  # the largest hysteresis is the default
+    expected = rangeedge.detectEdges(src, **geometry, **options)
+    assert np.array_equal(session.picture("thin map")[..., 0], expected)
+    for name in (*SLIDERS, *SWITCHES):
+        session.change(name, DETECTION[name].default)
+    assert session.options == {}
+
+
+def test_exports_make_the_same_edges(session, tmp_path, monkeypatch):
+    session.change("creaseThreshold", 20.0)
+    session.change("maxGap", 3)
+    monkeypatch.chdir(tmp_path)
+    rangeedge.imwriteRange("built-in scene.npz", session.image.src)
+    names = {}
+    exec(session.python().replace("built-in scene", "built-in scene.npz"), names)
+    detector = rangeedge.createScanLineDetector()
+    Path("detector.yml").write_bytes(session.settings())
+    detector.load("detector.yml")
+    expected = session.picture("thin map")[..., 0]
+    assert np.array_equal(names["edges"], expected)
+    assert np.array_equal(detector.detectEdges(session.image.src), expected)
+    assert detector.getCreaseThreshold() == 20
+
+
+def test_wrong_uploads_change_nothing(session):
+    before = session.picture("edges")
+    colour = cv2.imencode(".png", np.zeros((20, 30, 3), np.uint8))[1].tobytes()
+    truncated = cv2.imencode(".png", np.ones((200, 300), np.uint16))[1].tobytes()[:60]
+    for name, content in (
+        ("a.png", colour), ("b.png", truncated), ("c.txt", b"hello"), ("d.npy", b""), ("../e.png", b"\x89PNG"),
+    ):  # fmt: skip
+        with pytest.raises(rangeedge.error):
+            session.upload(name, content)
+    assert session.title == "built-in scene"
+    assert np.array_equal(session.picture("edges"), before)
+
+
+def test_geometry_as_typed(session):
+    with pytest.raises(rangeedge.error):
+        session.place("525, 525", "", height_map=False)
+    with pytest.raises(rangeedge.error, match="numbers"):
+        session.place("a, b", "", height_map=False)
+    session.place("500, 500, 320, 240", "", height_map=False)
+    assert np.allclose(session.geometry["K"], (500, 500, 320, 240))
+    session.place("", "0.002", height_map=True)
+    assert session.geometry == {"pixelSize": 0.002, "heightMap": True}
+
+
+def test_command_says_what_is_missing(monkeypatch, capsys):
+    monkeypatch.setitem(sys.modules, "nicegui", None)
+    monkeypatch.delitem(sys.modules, "rangeedge.explorer.page", raising=False)
+    assert main(["explore", "--no-browser"]) == 2
+    assert "pip install 'rangeedge[explorer]'" in capsys.readouterr().err
+
+
+@pytest.fixture
+def page(tmp_path):
+    """The page in a browser that shows nothing."""
+    pytest.importorskip("nicegui", reason="the extra [explorer] is not installed")
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+    if not (CHROMIUM and DRIVER):
+        pytest.skip("no browser: chromium and chromedriver are not installed")
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    command = [sys.executable, "-m", "rangeedge", "explore", "--no-browser", "--port", str(port)]
+    server = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    options = webdriver.ChromeOptions()
+    options.binary_location = CHROMIUM
+    for flag in [*FLAGS.split(), f"--user-data-dir={tmp_path / 'profile'}"]:
+        options.add_argument(flag)
+    options.add_experimental_option("prefs", {"download.default_directory": str(tmp_path)})
+    driver = None
+    try:
+        _wait(lambda: _open(port))
+        driver = webdriver.Chrome(options, webdriver.ChromeService(DRIVER))
+        driver.get(f"http://127.0.0.1:{port}/")
+        yield Page(driver, port)
+    finally:
+        if driver:
+            driver.quit()
+        server.terminate()
+        server.wait(10)
+
+
+def _open(port):
+    try:
+        return urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=5).status == 200
+    except OSError:
+        return False
+
+
+def _wait(condition, seconds=60):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        found = condition()
+        if found:
+            return found
+        time.sleep(0.1)
+    raise AssertionError("waited in vain")
+
+
+class Page:
+    def __init__(self, driver, port):
+        self.driver, self.port = driver, port
+
+    def text(self, name):
+        found = self.driver.find_elements("id", name)
+        return found[0].text if found else ""
+
+    def status(self):
+        return _wait(lambda: "edge pixels" in self.text("status") and self.text("status"))
+
+    def after(self, action):
+        before = self.status()
+        action()
+        return _wait(lambda: self.text("status") != before and self.text("status"))
+
+
+def edges_of(status):
+    return int(status.split(",")[1].split()[0])
+
+
+def test_page(page, tmp_path):
+    from selenium.webdriver import ActionChains, Keys
+
+    driver = page.driver
+    first = page.status()
+    assert first.startswith("640 x 480, ")
+    views = driver.find_elements("css selector", ".view img")
+    assert len(views) == 4
+    assert all(view.get_attribute("src").startswith("data:image/png") for view in views)
+
+    # A slider changes the edges, the program that the page shows, and nothing else.
+    slider = driver.find_element("css selector", "#creaseThreshold [role=slider], #creaseThreshold")
+    status = page.after(lambda: slider.send_keys(*[Keys.ARROW_RIGHT] * 40))
+    _wait(lambda: "creaseThreshold" in page.text("program"))
+    assert edges_of(page.status()) < edges_of(first)
+    assert status.endswith(" ms")
+
+    # A click asks why.
+    image = driver.find_element("css selector", "#view-edges img, #view-edges")
+    ActionChains(driver).move_to_element(image).click().perform()
+    _wait(lambda: page.text("words").startswith("Pixel (3"))
+    assert driver.find_elements("id", "why")
+
+    # The wheel zooms all views together.
+    ActionChains(driver).scroll_from_origin(_origin(image), 0, -300).perform()
+    zoom = "return getComputedStyle(document.documentElement).getPropertyValue('--zoom')"
+    _wait(lambda: float(driver.execute_script(zoom) or 1) > 1)
+
+    # Wrong uploads are told so; a right one is taken.
+    (upload,) = driver.find_elements("css selector", "input[type=file]")
+    (tmp_path / "notes.txt").write_text("hello")
+    upload.send_keys(str(tmp_path / "notes.txt"))
+    _wait(lambda: "notes.txt" in page.text("problem"))
+    assert page.text("title") == "built-in scene"
+    cv2.imwrite(str(tmp_path / "step.png"), np.where(np.arange(200) < 90, 900, 1200) * np.ones((150, 1), np.uint16))
+    (upload,) = driver.find_elements("css selector", "input[type=file]")
+    upload.send_keys(str(tmp_path / "step.png"))
+    _wait(lambda: page.status().startswith("200 x 150, "))
+    assert page.text("title") == "step.png"
+    assert page.text("problem") == ""
+
+
+def _origin(element):
+    from selenium.webdriver.common.actions.wheel_input import ScrollOrigin
+
+    return ScrollOrigin.from_element(element)
+
+
+def test_only_this_machine_can_open_it(page):
+    assert _open(page.port)
+    with socket.socket() as probe, pytest.raises(OSError, match="refused"):
+        probe.connect(("127.0.0.2", page.port))
