@@ -1,14 +1,17 @@
-"""Clean a depth frame: flying pixels out, holes filled, noise smoothed within surfaces.
+"""
+A depth frame without holes and with less noise
+===============================================
 
-    python samples/clean_depth.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
+python samples/clean_depth.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
 
-Without an image it renders a scene as a Kinect would see it, and prints how far depths are from the truth, before and
-after, on surfaces and beside edges, and where holes were filled; the same for what OpenCV has.
+Flying pixels out, holes filled from the surfaces around them, noise smoothed within surfaces. Without an image it
+renders a scene as a Kinect would see it, and prints how far depths are from the truth, before and after, on surfaces
+and beside edges, and where holes were filled; the same for what OpenCV has.
 """
 
 import cv2
 import numpy as np
-from common import built_in_scene, load, parser, relief, sheet, write
+from common import built_in_scene, load, parser, relief, write
 
 import rangeedge
 from rangeedge import CLEAN_FILLED, CLEAN_REMOVED, CLEAN_SMOOTHED
@@ -62,13 +65,12 @@ def main(argv=None):
             found[name] = errors(depth.astype(np.float64), src, rendering.depth, from_edges)
             print(f"{name:20s}" + "".join(f"{value:11.2f}" for value in found[name][:3]) + f"{found[name][3]:15d}")
 
-    picture = sheet(
+    panels = [
         ("as measured", relief(src, geometry)),
         ("cleaned", relief(cleaned, geometry)),
         ("smoothed (grey), filled (yellow), removed (vermilion)", changes(changed)),
-        columns=3,
-    )
-    write(args.out, "clean_depth.png", picture)
+    ]
+    write(args.out, "clean_depth.png", rangeedge.drawPanels(panels, 3))
     return found
 
 

@@ -54,11 +54,6 @@ def gaps(src, geometry):
     return cv2.morphologyEx(255 * missing.astype(np.uint8), cv2.MORPH_OPEN, np.ones((3, 3), np.uint8))
 
 
-def shown(geometry):
-    """What pictures take of a geometry."""
-    return {name: geometry[name] for name in ("K", "heightMap") if name in geometry}
-
-
 def relief(src, geometry):
     """The range image as a shaded picture to draw on."""
     nothing = np.zeros(src.shape[:2], np.uint8)

@@ -1,20 +1,23 @@
-"""Ridges and eaves of houses, from a surface model to a map in GeoJSON.
+"""
+Ridges and eaves on a map
+=========================
 
-    python samples/roof_ridges.py [IMAGE] [--out DIR]
+python samples/roof_ridges.py [IMAGE] [--out DIR]
 
-An IMAGE with a georeference (GeoTIFF, ASCII grid) gives lines in its coordinates. Without one the sample makes three
-houses with gable roofs, and prints how far ridges and eaves are from the truth.
+Roofs of a surface model as lines in GeoJSON. An IMAGE with a georeference (GeoTIFF, ASCII grid) gives lines in its
+coordinates. Without one the sample makes three houses with gable roofs, and prints how far ridges and eaves are from
+the truth.
 """
 
 import numpy as np
-from common import load, parser, shown, write
+from common import load, parser, write
 
 import rangeedge
 from rangeedge import EDGE_CONVEX, EDGE_JUMP, RangeImage
 
 PIXEL = 0.25  # metres
 SIZE = (320, 260)
-CORNER = (358000.0, 5812000.0)  # of the map, upper left
+CORNER, EPSG = (358000.0, 5812000.0), 32633  # of the map, upper left; UTM zone 33
 NOISE = 0.03
 HOUSES = (  # middle, direction of the ridge in degrees, half length, half width, height of eaves and of ridge: metres
     ((22, 20), 20, 9, 6, 5, 9),
@@ -33,7 +36,8 @@ def built_in_scene():
         height = np.where((np.abs(u) <= length) & (np.abs(v) <= width), 3 + roof, height)
     height += np.random.default_rng(0).normal(0, NOISE, height.shape)
     georeference = np.array([[PIXEL, 0, CORNER[0] + PIXEL / 2], [0, -PIXEL, CORNER[1] - PIXEL / 2]])
-    return RangeImage(height, {"pixelSize": (PIXEL, PIXEL), "heightMap": True}, georeference=georeference)
+    geometry = {"pixelSize": (PIXEL, PIXEL), "heightMap": True}
+    return RangeImage(height, geometry, georeference=georeference, epsg=EPSG)
 
 
 def along(x, y, turn):
@@ -71,8 +75,8 @@ def main(argv=None):
         truth = f", {100 * np.sqrt(np.mean(np.square(off[kind]))):.1f} cm rms from the truth" if off.get(kind) else ""
         print(f"{len(own)} {name}, {own['length'].sum():.1f} m{truth}")
 
-    write(args.out, "roof_ridges.png", rangeedge.drawSegments(src, segments, scale=2, lengths=True, **shown(geometry)))
-    rangeedge.writeLines(args.out / "roof_ridges.geojson", segments, image.georeference)
+    write(args.out, "roof_ridges.png", rangeedge.drawSegments(src, segments, scale=2, lengths=True, **geometry))
+    rangeedge.writeLines(args.out / "roof_ridges.geojson", segments, image.georeference, epsg=image.epsg)
     print(args.out / "roof_ridges.geojson")
     return off
 

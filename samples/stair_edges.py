@@ -1,13 +1,15 @@
-"""The edges of stairs from one depth frame: where a foot goes, how high and how deep each step is.
+"""
+How high are the stairs?
+========================
 
-    python samples/stair_edges.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
+python samples/stair_edges.py [IMAGE [-K fx,fy,cx,cy]] [--out DIR]
 
-Without an image it renders stairs as a Kinect before them would see them, and prints how far rises and treads are from
-the truth.
+The edges of steps from one depth frame: where a foot goes, how high and how deep each step is. Without an image it
+renders stairs as a Kinect before them would see them, and prints how far rises and treads are from the truth.
 """
 
 import numpy as np
-from common import load, parser, shown, write
+from common import load, parser, write
 
 import rangeedge
 from rangeedge import EDGE_CONVEX
@@ -69,7 +71,7 @@ def main(argv=None):
         truth = f", error {1000 * (rise - RISE):+.1f} and {1000 * (tread - TREAD):+.1f} mm" if rendered else ""
         print(f"rise {rise:.3f}, tread {tread:.3f}{truth}")
 
-    write(args.out, "stair_edges.png", rangeedge.drawSegments(src, edges, scale=2, lengths=True, **shown(geometry)))
+    write(args.out, "stair_edges.png", rangeedge.drawSegments(src, edges, scale=2, lengths=True, **geometry))
     return rises, treads
 
 

@@ -1,13 +1,16 @@
-"""The toes of a weld: where its bead meets the plate, from the height map of a profile sensor, and how wide it is.
+"""
+Where does the weld end?
+========================
 
-    python samples/weld_line.py [IMAGE --pixel-size D --height-map] [--out DIR]
+python samples/weld_line.py [IMAGE --pixel-size D --height-map] [--out DIR]
 
-Without an image it makes a plate with a bead that wanders, and prints how far its toes and its width are from the
-truth. Writes the lines, pixels and millimetres, as a table for a robot.
+Its toes, where the bead meets the plate, from the height map of a profile sensor, and how wide it is. Without an image
+it makes a plate with a bead that wanders, and prints how far its toes and its width are from the truth. Writes the
+lines, pixels and millimetres, as a table for a robot.
 """
 
 import numpy as np
-from common import load, parser, shown, write
+from common import load, parser, write
 
 import rangeedge
 from rangeedge import EDGE_CONCAVE
@@ -67,7 +70,7 @@ def main(argv=None):
         truth = f", truth {WIDTH:.2f}" if rendered else ""
         print(f"width {np.nanmean(measured):.2f} +- {np.nanstd(measured):.2f} mm{truth}")
 
-    picture = rangeedge.drawChains(src, lines, **shown(geometry))
+    picture = rangeedge.drawChains(src, lines, **geometry)
     write(args.out, "weld_line.png", picture)
     rangeedge.writeLines(args.out / "weld_line.csv", lines)
     print(args.out / "weld_line.csv")
