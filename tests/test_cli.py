@@ -506,3 +506,26 @@ def test_lines_takes_the_options_of_linking(image, tmp_path, capsys):
     assert json.loads((tmp_path / "a" / "report.json").read_text())["segments"] == 0
     assert run(capsys, "lines", image, *CAMERA, "--bridge", "-1", "--out", tmp_path / "b")[0] == 2
     assert not (tmp_path / "b").exists()
+
+
+def test_clean_writes_a_range_image(tmp_path, capsys):
+    depth = box()
+    depth[30:34, 70:75] = 0
+    imwriteRange(tmp_path / "box.png", depth)
+    code, said, _ = run(capsys, "clean", tmp_path / "box.png", *CAMERA, "--out", tmp_path / "cleaned.png")
+    assert code == 0
+    assert "pixels smoothed" in said
+    cleaned = imreadRange(tmp_path / "cleaned.png").src
+    assert cleaned.dtype == np.uint16
+    assert (cleaned[30:34, 70:75] > 1400).all()
+    assert np.std(cleaned[50:58, 5:75]) < np.std(depth[50:58, 5:75].astype(float)) / 2
+    code, _, _ = run(
+        capsys, "clean", tmp_path / "box.png", *CAMERA, "--max-hole", 0, "--radius", 0, "--out", tmp_path / "same.npz"
+    )
+    assert code == 0
+    kept, geometry = imreadRange(tmp_path / "same.npz")
+    assert (kept[30:34, 70:75] == 0).all()
+    assert geometry["K"][0, 0] == 100
+    code, _, error = run(capsys, "clean", tmp_path / "box.png", "--max-hole", -1, "--out", tmp_path / "no.png")
+    assert code == 2
+    assert "maxHole" in error

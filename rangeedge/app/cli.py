@@ -1,4 +1,4 @@
-"""The command `rangeedge`: detect, segment, lines, explain, batch, demo, explore and bench."""
+"""The command `rangeedge`: detect, segment, lines, clean, explain, batch, demo, explore and bench."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..draw import drawEdges
 from ..io import RangeImage
 from ..io.atomic import write_atomically
 from ..io.lines import is_line_file, writeLines
-from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing, Linking
+from ..options import CLEANING, DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Cleaning, Growing, Linking
 from .batch import detect_file, read_image
 from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
 from .results import (
@@ -56,6 +56,9 @@ _EPILOGUES = {
   rangeedge lines depth.png -K 525,525,319.5,239.5 --out lines
   rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines
   rangeedge lines terrain.tiff --out ridges.geojson    # or .csv, .ply, .obj, .dxf, .svg: the chains alone""",
+    "clean": """examples:
+  rangeedge clean depth.png -K 525,525,319.5,239.5 --out cleaned.png
+  rangeedge clean terrain.tiff --max-hole 40 --radius 0 --out filled.tiff""",
     "explain": """examples:
   rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233
   rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233 --crease-threshold 20 --out why.png
@@ -137,6 +140,15 @@ def _parser() -> argparse.ArgumentParser:
     _add_options(lines, "how lines are linked", Linking.options)
     _add_detector(lines)
 
+    clean = _command(commands, "clean", _clean, "fill the holes of one range image and smooth its surfaces")
+    clean.add_argument("image", metavar="IMAGE", help=_INPUT)
+    clean.add_argument(
+        "--out", required=True, type=Path, metavar="FILE", help=".png, .tiff, .exr, .npy, .npz, .ply, ..."
+    )
+    _add_geometry(clean)
+    _add_options(clean, "what is done", Cleaning.options)
+    _add_option(clean, CLEANING["noise"])
+
     explain = _command(commands, "explain", _explain, "say why a pixel is an edge, or why it is none")
     explain.add_argument("image", metavar="IMAGE", help=_INPUT)
     explain.add_argument("--at", required=True, type=_reader(_pixel), metavar="X,Y", help="the pixel: column, row")
@@ -194,6 +206,7 @@ _USAGES = {
     "detect": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "segment": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "lines": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
+    "clean": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out FILE",
     "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
     "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
     "demo": "[--real] [options] --out DIR",
@@ -354,6 +367,14 @@ def _write_lines(path: Path, lines: Any, image: RangeImage) -> None:
         geometry = {name: value for name, value in image.geometry.items() if name in GEOMETRY}
         more["picture"] = drawEdges(image.src, nothing, **geometry)
     writeLines(path, lines, **more)
+
+
+def _clean(args: argparse.Namespace) -> int:
+    from .clean import clean_file
+
+    print(clean_file(read_image(args.image, _options(args)), args.out))
+    print(args.out)
+    return 0
 
 
 @named("explain")
