@@ -122,7 +122,8 @@ def regionBoundaries(
     2. *Planes that meet* do so in a straight line of the image, and three of them in a point. With `src`, and a
        tolerance above 0, vertices within two pixels of such a line are moved onto it, and corners into its points.
     3. *In space* every vertex lies on the surface of the region: the plane, or the quadratic where a plane fails,
-       through its pixels, over the image, of heights on a grid or inverse depths of a camera.
+       through its pixels, over the image, of heights on a grid or inverse depths of a camera. In an image that looks
+       all around it is the mean of the points that the pixels of the region around it see, and 2. does not apply.
 
     Parameters
     ----------

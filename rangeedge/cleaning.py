@@ -12,6 +12,7 @@ from . import _core
 from ._check import image8, labels32s
 from ._option import parsed, takes
 from .constants import CLEAN_FILLED, CLEAN_REMOVED, CLEAN_SMOOTHED
+from .detector import selected, thin_lines
 from .edges import kernel_options, no_strength
 from .forms import range_array
 from .frame import Frame
@@ -19,9 +20,7 @@ from .noise import measured_frame
 from .options import CLEANING, Cleaning, Growing, ScanLineParams, Selection
 from .regions import seeded_regions
 from .sectors import sectors_of
-from .selection import select_strength
 from .surfaces import places, relative_ordinate
-from .thinning import thinEdges
 from .viewpoint import distorted_rays
 
 if TYPE_CHECKING:
@@ -137,19 +136,23 @@ def _cleaned(
         found = seeded_regions(kept, edges, Growing())[1]
     else:
         found = np.where(kept.valid > 0, np.maximum(given, 0), 0).astype(np.int32)
+    flies = flying > 0
+    if values.ndim == 3:
+        points = _smoothed_points(frame, params, found, flies, cleaning.radius)
+        return _delivered(values, points, np.isfinite(points[..., 0]), flies, frame, params, cleaning)
     missing = kept.valid == 0
     if inside is not None:
         missing &= inside != 0
-    holes = _narrow(missing, cleaning.maxHole) if values.ndim == 2 else np.zeros(frame.shape, np.uint8)
-    ordinate = _smoothed(frame, params, found, holes, flying > 0, cleaning.radius)
-    return _delivered(values, frame, params, ordinate, flying > 0, cleaning)
+    ordinate = _smoothed(frame, params, found, _narrow(missing, cleaning.maxHole), flies, cleaning.radius)
+    lengths = _lengths(values, ordinate, frame, params)
+    return _delivered(values, lengths, np.isfinite(ordinate), flies, frame, params, cleaning)
 
 
 def _edges_and_flying(frame: Frame, params: ScanLineParams, flying: np.ndarray) -> np.ndarray:
     """The edges, thin, and in `flying` 255 where pixels fly: both by one approximation of the scan lines."""
     strength = no_strength(frame.shape)
     _core.edge_strength_and_flying(frame.kernel, kernel_options(frame, params), frame.threads, *strength, flying)
-    return thinEdges(select_strength(strength, Selection()))
+    return thin_lines(frame, selected(frame, strength, Selection()))
 
 
 def _without(frame: Frame, removed: np.ndarray) -> Frame:
@@ -180,12 +183,12 @@ def _distance(where: np.ndarray) -> np.ndarray:
 def _smoothed(
     frame: Frame, params: ScanLineParams, labels: np.ndarray, holes: np.ndarray, flying: np.ndarray, radius: float
 ) -> np.ndarray:
-    """The ordinate of every pixel that lies on a surface, NaN elsewhere."""
+    """The ordinate along the axis of every pixel that lies on a surface, NaN elsewhere."""
     measured, offset, _ = relative_ordinate(frame)
     relative = np.where(flying, np.float32(np.nan), measured)
     mixed = np.where(flying, measured, np.float32(np.nan))
     x, y, _ = places(frame)
-    if params.distCoeffs is not None and x is not None:
+    if x is not None and params.distCoeffs is not None:
         rays = distorted_rays(params.K, params.distCoeffs, frame.shape) * params.K[0, 0]
         x, y = (np.ascontiguousarray(rays[..., k], np.float32) for k in (0, 1))
     zero = -offset if frame.projective else -np.inf
@@ -195,41 +198,51 @@ def _smoothed(
     return smoothed.astype(np.float64) + offset
 
 
-def _delivered(
-    values: np.ndarray,
-    frame: Frame,
-    params: ScanLineParams,
-    ordinate: np.ndarray,
-    flying: np.ndarray,
-    cleaning: Cleaning,
-) -> CleanedDepth:
-    smoothed = np.isfinite(ordinate) & (frame.valid > 0) & ~flying & (cleaning.radius > 0)
-    filled = np.isfinite(ordinate) & ((frame.valid == 0) | flying)
-    depth = values.copy()
-    if values.ndim == 3:
-        depth[..., :3][smoothed] = _moved(frame, ordinate, smoothed)
-    else:
-        new = smoothed | filled
-        lengths = 1 / ordinate[new] if frame.projective else ordinate[new] * (1 if frame.heightMap else -1)
-        if values.dtype.kind in "iu":
-            info = np.iinfo(values.dtype)
-            lengths = np.clip(np.rint(lengths * params.depthFactor), info.min + 1, info.max)
-        depth[new] = lengths
-    depth[flying & ~filled] = _no_data(values, params)
-    changed = np.where(smoothed, CLEAN_SMOOTHED, 0) + np.where(flying, CLEAN_REMOVED, 0)
-    changed += np.where(filled, CLEAN_FILLED, 0)
-    return CleanedDepth(depth, changed.astype(np.uint8))
-
-
-def _moved(frame: Frame, ordinate: np.ndarray, which: np.ndarray) -> np.ndarray:
-    """Points at these pixels, moved along their lines of sight to other ordinates."""
+def _smoothed_points(
+    frame: Frame, params: ScanLineParams, labels: np.ndarray, flying: np.ndarray, radius: float
+) -> np.ndarray:
+    """(H, W, 3) points moved along their lines of sight onto surfaces, NaN elsewhere."""
+    ordinate = _smoothed(frame, params, labels, np.zeros(frame.shape, np.uint8), flying, radius)
+    which = np.isfinite(ordinate) & (frame.valid > 0)
     points, axis = frame.samples[which].astype(np.float64), np.asarray(frame.axis)
     along = points @ axis
     if frame.projective:
         points *= (1 / (ordinate[which] * along))[:, None]
     else:
         points += (-ordinate[which] - along)[:, None] * axis
-    return points + np.asarray(frame.origin)
+    moved = np.full((*frame.shape, 3), np.nan)
+    moved[which] = points + np.asarray(frame.origin)
+    return moved
+
+
+def _lengths(values: np.ndarray, ordinate: np.ndarray, frame: Frame, params: ScanLineParams) -> np.ndarray:
+    """What an image of the type of `values` holds for ordinates."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lengths = 1 / ordinate if frame.projective else ordinate * (1 if frame.heightMap else -1)
+    if values.dtype.kind == "f":
+        return lengths
+    info = np.iinfo(values.dtype)
+    return np.clip(np.rint(np.nan_to_num(lengths) * params.depthFactor), info.min + 1, info.max)
+
+
+def _delivered(
+    values: np.ndarray,
+    new: np.ndarray,
+    known: np.ndarray,
+    flying: np.ndarray,
+    frame: Frame,
+    params: ScanLineParams,
+    cleaning: Cleaning,
+) -> CleanedDepth:
+    """The image with its `new` values where these are `known` and wanted."""
+    there = (frame.valid > 0) & ~flying
+    smoothed, filled = known & there & (cleaning.radius > 0), known & ~there
+    depth = values.copy()
+    lengths = depth[..., :3] if depth.ndim == 3 else depth
+    lengths[smoothed | filled] = new[smoothed | filled]
+    lengths[flying & ~filled] = _no_data(values, params)
+    changed = CLEAN_SMOOTHED * smoothed + CLEAN_REMOVED * flying + CLEAN_FILLED * filled
+    return CleanedDepth(depth, changed.astype(np.uint8))
 
 
 def _no_data(values: np.ndarray, params: ScanLineParams) -> float:

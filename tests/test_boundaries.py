@@ -252,3 +252,21 @@ def test_bad_arguments_are_named(call, text):
     with pytest.raises(rangeedge.error) as problem:
         call()
     assert text in str(problem.value)
+
+
+def test_rooms_seen_all_around_have_outlines_in_space():
+    azimuth = np.radians(np.arange(0, 360, 1.0))
+    elevation = np.radians(np.arange(-30, 30, 2.0))[:, None]
+    parts = np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)
+    rays = np.stack(np.broadcast_arrays(*parts), axis=-1)
+    with np.errstate(divide="ignore"):
+        ways = np.array([2, 1.5, 1.2]) / np.abs(rays)
+    points = rays * ways.min(axis=2)[..., None]
+    labels = (
+        1 + 2 * ways.argmin(axis=2) + (np.take_along_axis(rays, ways.argmin(axis=2)[..., None], 2)[..., 0] > 0)
+    ).astype(np.int32)
+    found = regionBoundaries(labels, points)
+    for region in found:
+        axis, positive = divmod(region.label - 1, 2)
+        side = (2, 1.5, 1.2)[axis] * (1 if positive else -1)
+        assert np.allclose(region.outline["point"][:, axis], side, atol=1e-6)

@@ -523,3 +523,26 @@ def test_warnings_speak_of_flags(tmp_path, capsys):
     assert main([*argv, "--invalid", "none"]) == 0
     assert main([*argv, "--invalid", "0,65535"]) == 0
     assert capsys.readouterr().err == ""
+
+
+def test_clean_writes_a_range_image(tmp_path, capsys):
+    depth = box()
+    depth[30:34, 70:75] = 0
+    imwriteRange(tmp_path / "box.png", depth)
+    code, said, _ = run(capsys, "clean", tmp_path / "box.png", *CAMERA, "--out", tmp_path / "cleaned.png")
+    assert code == 0
+    assert "pixels smoothed" in said
+    cleaned = imreadRange(tmp_path / "cleaned.png").src
+    assert cleaned.dtype == np.uint16
+    assert (cleaned[30:34, 70:75] > 1400).all()
+    assert np.std(cleaned[50:58, 5:75]) < np.std(depth[50:58, 5:75].astype(float)) / 2
+    code, _, _ = run(
+        capsys, "clean", tmp_path / "box.png", *CAMERA, "--max-hole", 0, "--radius", 0, "--out", tmp_path / "same.npz"
+    )
+    assert code == 0
+    kept, geometry = imreadRange(tmp_path / "same.npz")
+    assert (kept[30:34, 70:75] == 0).all()
+    assert geometry["K"][0, 0] == 100
+    code, _, error = run(capsys, "clean", tmp_path / "box.png", "--max-hole", -1, "--out", tmp_path / "no.png")
+    assert code == 2
+    assert "maxHole" in error

@@ -424,6 +424,17 @@ def test_georeference_of_geotiff(tmp_path):
     assert_allclose(centre.georeference @ (2, 4, 1), [1000, 2000])
     assert_allclose(centre.georeference @ (4, 8, 1), [1001, 1999])
     assert read(tmp_path, tiff(HOLES)).georeference is None
+    assert corner.epsg is None
+
+
+@pytest.mark.parametrize(
+    ("keys", "code"),
+    [(((1024, 1), (3072, 32633)), 32633), (((1024, 2), (2048, 4326)), 4326), (((3072, 32767), (2048, 4258)), 4258)],
+)
+def test_reference_system_of_geotiff(keys, code, tmp_path):
+    tie = (0, 0, 0, 10.0, 50.0, 0)
+    image = read(tmp_path, tiff(HOLES, extratags=geo(*keys, scale=(1e-5, 1e-5, 0), tie=tie)))
+    assert image.epsg == image.withGeometry(pixelSize=1).epsg == code
 
 
 def test_range_images_are_pairs_that_remember_more():

@@ -1,4 +1,4 @@
-"""The command `rangeedge`: detect, segment, lines, explain, batch, demo, explore and bench."""
+"""The command `rangeedge`: detect, segment, lines, clean, explain, batch, demo, explore and bench."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..draw import drawEdges
 from ..io import RangeImage
 from ..io.atomic import write_atomically
 from ..io.lines import is_line_file, writeLines
-from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing, Linking
+from ..options import CLEANING, DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Cleaning, Growing, Linking
 from .batch import detect_file, read_image
 from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
 from .results import (
@@ -32,6 +32,7 @@ from .results import (
     encoded,
     find_edges,
     find_regions,
+    on_map,
     outlines_of,
     region_files,
     write_folder,
@@ -97,6 +98,15 @@ def _parser() -> argparse.ArgumentParser:
     _add_geometry(lines)
     _add_options(lines, "how lines are linked", Linking.options)
     _add_detector(lines)
+
+    clean = _command(commands, "clean", _clean, "fill the holes of one range image and smooth its surfaces")
+    clean.add_argument("image", metavar="IMAGE", help=INPUT)
+    clean.add_argument(
+        "--out", required=True, type=Path, metavar="FILE", help=".png, .tiff, .exr, .npy, .npz, .ply, ..."
+    )
+    _add_geometry(clean)
+    _add_options(clean, "what is done", Cleaning.options)
+    _add_option(clean, CLEANING["noise"])
 
     explain = _command(commands, "explain", _explain, "say why a pixel is an edge, or why it is none")
     explain.add_argument("image", metavar="IMAGE", help=INPUT)
@@ -269,7 +279,7 @@ def _segment(args: argparse.Namespace) -> int:
     if alone:
         _write_lines(args.out, outlines_of(found), image)
     else:
-        write_folder(args.out, region_files(found, args.image, options, image.georeference))
+        write_folder(args.out, region_files(found, args.image, options, image))
     _say_found(args.image, found.edges)
     print(f"{len(found.surfaces) - 1} regions from {found.seeds.max()} seeds")
     if not alone:
@@ -297,12 +307,20 @@ def _lines(args: argparse.Namespace) -> int:
 def _write_lines(path: Path, lines: Any, image: RangeImage) -> None:
     """Lines to a file of their own, on the map where the image is on one, over the image where that is a picture."""
     suffix = path.suffix.lower()
-    more: dict[str, Any] = {"transform": image.georeference} if suffix == ".geojson" else {}
+    more: dict[str, Any] = on_map(image) if suffix == ".geojson" else {}
     if suffix == ".svg":
         nothing = np.zeros(image.src.shape[:2], np.uint8)
         geometry = {name: value for name, value in image.geometry.items() if name in GEOMETRY}
         more["picture"] = drawEdges(image.src, nothing, **geometry)
     writeLines(path, lines, **more)
+
+
+def _clean(args: argparse.Namespace) -> int:
+    from .clean import clean_file
+
+    print(clean_file(read_image(args.image, _options(args)), args.out))
+    print(args.out)
+    return 0
 
 
 @named("explain")

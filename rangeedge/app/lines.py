@@ -12,7 +12,7 @@ from ..draw import drawSegments
 from ..io import RangeImage
 from ..io.lines import encoded_lines
 from ..segments import Segments, fitSegments
-from .results import encoded, plain
+from .results import encoded, on_map, plain
 
 _SCALE_PIXELS = 1200  # at least as wide is the picture
 
@@ -53,7 +53,7 @@ def line_files(
         "lines.png": encoded(".png", picture),
         "chains.csv": encoded_lines(".csv", chains),
         "chains.ply": encoded_lines(".ply", chains),
-        "chains.geojson": encoded_lines(".geojson", chains, transform=image.georeference),
+        "chains.geojson": encoded_lines(".geojson", chains, **on_map(image)),
         "segments.csv": encoded_lines(".csv", found),
         "segments.obj": encoded_lines(".obj", found),
         "report.json": json.dumps(report, indent=2, allow_nan=False).encode() + b"\n",

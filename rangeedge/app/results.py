@@ -27,6 +27,7 @@ from ..distance import distanceTransform
 from ..draw import drawOverview, drawRegions, region_overview
 from ..edges import EdgeStrength, measure_both
 from ..frame import Frame
+from ..io import RangeImage
 from ..io.atomic import nameless, put
 from ..io.lines import encoded_lines
 from ..noise import measured_frame
@@ -142,15 +143,20 @@ def edge_files(found: EdgeResults, title: str, options: Mapping[str, Any]) -> di
 
 
 @named("segment")
+def on_map(image: RangeImage | None) -> dict[str, Any]:
+    """What GeoJSON takes of an image that lies on a map."""
+    return {} if image is None else {"transform": image.georeference, "epsg": image.epsg}
+
+
 def outlines_of(found: RegionResults) -> RegionBoundaries:
     """The outlines of the regions."""
     return boundaries_of(found.labels, found.edges.frame, _OUTLINE)
 
 
 def region_files(
-    found: RegionResults, title: str, options: Mapping[str, Any], georeference: np.ndarray | None = None
+    found: RegionResults, title: str, options: Mapping[str, Any], image: RangeImage | None = None
 ) -> dict[str, bytes]:
-    """The files of REGION_FILES."""
+    """The files of REGION_FILES, outlines on the map if `image` lies on one."""
     edges, count, seeds = found.edges, len(found.surfaces) - 1, int(found.seeds.max())
     if count > _LABELS:
         raise error(f"labels.png has room for {_LABELS} regions, {count} were found; raise `minArea`")
@@ -170,7 +176,7 @@ def region_files(
     return {
         "overview.png": encoded(".png", overview),
         "outlines.svg": encoded_lines(".svg", outlines, picture=picture),
-        "outlines.geojson": encoded_lines(".geojson", outlines, transform=georeference),
+        "outlines.geojson": encoded_lines(".geojson", outlines, **on_map(image)),
         "labels.png": encoded(".png", found.labels.astype(np.uint16)),
         "seeds.png": encoded(".png", found.seeds.astype(np.uint16)),
         "surfaces.csv": _surfaces_csv(found.stats, found.surfaces),

@@ -41,7 +41,7 @@ def _edge_arrays(image: RangeImage) -> tuple[Arrays, Counts]:
 
 def _region_files(image: RangeImage, title: str, options: Mapping[str, Any]) -> tuple[dict[str, bytes], Counts]:
     found = find_regions(image.src, **image.geometry)
-    return region_files(found, title, options), {"regions": len(found.surfaces) - 1}
+    return region_files(found, title, options, image), {"regions": len(found.surfaces) - 1}
 
 
 def _region_arrays(image: RangeImage) -> tuple[Arrays, Counts]:

@@ -30,6 +30,9 @@ EPILOGUES = {
   rangeedge lines depth.png -K 525,525,319.5,239.5 --out lines
   rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines
   rangeedge lines terrain.tiff --out ridges.geojson    # or .csv, .ply, .obj, .dxf, .svg: the chains alone""",
+    "clean": """examples:
+  rangeedge clean depth.png -K 525,525,319.5,239.5 --out cleaned.png
+  rangeedge clean terrain.tiff --max-hole 40 --radius 0 --out filled.tiff""",
     "explain": """examples:
   rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233
   rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233 --crease-threshold 20 --out why.png
@@ -58,6 +61,7 @@ USAGES = {
     "detect": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "segment": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
     "lines": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
+    "clean": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out FILE",
     "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
     "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
     "demo": "[--real] [options] --out DIR",

@@ -17,7 +17,8 @@ from .tiff_tags import Page
 METRES_PER_DEGREE = 6371008.8 * np.pi / 180  # along a meridian of the mean sphere
 _UNREAL = 1e38  # no length is as large; the largest float stands for no data in many files
 
-_MODEL_TYPE, _RASTER_TYPE = 1024, 1025  # geo keys
+_MODEL_TYPE, _RASTER_TYPE, _GEODETIC_SYSTEM, _PROJECTED_SYSTEM = 1024, 1025, 2048, 3072  # geo keys
+_OWN_SYSTEM = 32767  # one that the file itself defines
 _GEOGRAPHIC, _PIXEL_IS_POINT = 2, 2
 
 
@@ -27,11 +28,11 @@ def described_by(page: Page, image: np.ndarray) -> RangeImage:
     image = _scaled(image, page.text(tag.GDAL_METADATA) if tag.GDAL_METADATA in page else "")
     georeference = _georeference(page)
     if georeference is None or image.ndim != 2:
-        return RangeImage(image, georeference=georeference)
+        return RangeImage(image, georeference=georeference, epsg=_epsg(page))
     geometry: dict[str, Any] = {"pixelSize": _pixel_size(page, georeference, image.shape[0]), "heightMap": True}
     if image.dtype.kind != "f":
         geometry["depthFactor"] = 1.0
-    return RangeImage(image, geometry, georeference=georeference)
+    return RangeImage(image, geometry, georeference=georeference, epsg=_epsg(page))
 
 
 def _without_data(image: np.ndarray, nodata: str) -> np.ndarray:
@@ -103,6 +104,15 @@ def _pixel_size(page: Page, georeference: np.ndarray, rows: int) -> tuple[float,
         latitude = georeference[1] @ (0, (rows - 1) / 2, 1)
         dx, dy = dx * METRES_PER_DEGREE * float(np.cos(np.deg2rad(latitude))), dy * METRES_PER_DEGREE
     return dx, dy
+
+
+def _epsg(page: Page) -> int | None:
+    """The code of the reference system."""
+    for key in (_PROJECTED_SYSTEM, _GEODETIC_SYSTEM):
+        code = _geo_key(page, key)
+        if code and code != _OWN_SYSTEM:
+            return code
+    return None
 
 
 def _geo_key(page: Page, key: int) -> int | None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .._check import error
 from .polylines import Line, grouped, is_hole, no_pixels
 
 
@@ -36,7 +37,7 @@ def _coordinates(line: Line, transform: np.ndarray | None) -> list[list[float]]:
         points = np.concatenate([points, points[:1]])
     known = np.isfinite(points)
     if not known[:, :2].all():
-        raise ValueError("lines without coordinates make no map: give src to regionBoundaries, or a transform")
+        raise error("lines without points in space make no map: give `src` to regionBoundaries, or a `transform`")
     return [point if seen else point[:2] for point, seen in zip(points.tolist(), known[:, 2].tolist(), strict=True)]
 
 

@@ -25,12 +25,15 @@ class RangeImage(_SourceAndGeometry):
         the sensor, as PCD files have it. None where the file does not say.
     georeference : (2, 3) float64 array or None
         Map coordinates of pixel centres: ``x, y = georeference @ (column, row, 1)``, from a GeoTIFF.
+    epsg : int or None
+        The code of the reference system of these, where the file names one.
 
     It unpacks as a pair: ``src, geometry = imreadRange(path)``.
     """
 
     viewpoint: tuple[float, ...] | None
     georeference: np.ndarray | None
+    epsg: int | None
 
     def __new__(
         cls,
@@ -39,10 +42,12 @@ class RangeImage(_SourceAndGeometry):
         *,
         viewpoint: tuple[float, ...] | None = None,
         georeference: np.ndarray | None = None,
+        epsg: int | None = None,
     ) -> RangeImage:
         image = super().__new__(cls, src, {} if geometry is None else geometry)
         image.viewpoint = viewpoint
         image.georeference = georeference
+        image.epsg = epsg
         return image
 
     def withGeometry(self, **given: Any) -> RangeImage:
