@@ -1,4 +1,36 @@
-"""Edges in range images by scan line approximation, and what follows from them: distances, seeds and regions."""
+"""Edges in range images by scan line approximation, and what follows from them: distances, seeds and regions.
+
+First steps
+-----------
+>>> import numpy as np
+>>> import rangeedge
+>>> depth = np.full((480, 640), 1500, np.uint16)  # millimetres of a depth camera, 0 where nothing is seen
+>>> depth[120:360, 160:480] = 1200
+>>> edges = rangeedge.detectEdges(depth, K=(525, 525, 319.5, 239.5))  # 0 and 255, one pixel wide
+>>> int(np.count_nonzero(edges))
+1116
+
+The image is depths of a camera (`K`), heights or depths on a grid (`pixelSize`, `heightMap=True`), or organized points
+(H, W, 3). `imreadRange` reads files. Thresholds follow the noise of the image; `explainPixel` says why a pixel is an
+edge or none, and which option changes that.
+
+What there is, in the order data flows
+--------------------------------------
+read and write      imreadRange, imwriteRange, backproject, project, sweepToPoints
+noise, repair       estimateNoise, NoiseModel, flyingPixels, cleanDepth
+edges               detectEdges, detectEdgesWithStrength, createScanLineDetector (streams), mapFrames
+why                 explainPixel, drawExplanation
+strengths           edgeStrength, edgePoints, kindNames, splitScanLine, strengthImage, overallStrength
+select and thin     selectEdges, thinEdges, closeContours
+lines in space      linkEdges, fitSegments, writeLines
+distances           distanceTransform, salienceDistanceTransform, ...WithLabels
+seeds, surfaces     extractSeeds, growRegions, segmentRegions, ...WithStats, regionAdjacency
+pictures (BGR)      drawEdges, drawRegions, drawChains, drawSegments, colorizeDistance, drawOverview, drawPanels
+more                rangeedge.synthetic, rangeedge.evaluation, rangeedge.optimality, rangeedge.batch
+
+`help(rangeedge.detectEdges)` has every option. From a shell: `rangeedge --help`; sliders: `rangeedge explore`.
+Every bad argument raises `rangeedge.error`, which is a `cv2.error` and a `ValueError`.
+"""
 
 from __future__ import annotations
 

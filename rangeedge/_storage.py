@@ -47,6 +47,11 @@ def load(filename: str | os.PathLike[str], node: str) -> tuple[str, dict[str, An
     except (OSError, ValueError) as reason:
         what = getattr(reason, "strerror", None) or reason
         raise error(f"cannot read {name!r}: {what}", cv2.Error.StsObjectNotFound) from reason
+    # OpenCV 4.8 does not survive all files that have lost their end.
+    if node not in text:
+        raise error(f"{name!r} holds no `{node}`", cv2.Error.StsParseError)
+    if _OPENING in text and _CLOSING not in text:
+        raise error(f"{name!r} is not complete", cv2.Error.StsParseError)
     fs = cv2.FileStorage()
     try:
         fs.open(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)

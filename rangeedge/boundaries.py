@@ -189,7 +189,7 @@ def boundaries_of(labels: np.ndarray, frame: Frame | None, tolerance: float, uni
         tolerances /= surfaces.spacing(vertices[arcs[:, 0]], beside)
     if tolerance > 0:
         vertices, counts = _simplified(vertices, counts, tolerances)
-        if surfaces is not None and surfaces.flat_image:
+        if isinstance(surfaces, _Surfaces) and surfaces.flat_image:
             vertices, counts = _simplified(
                 _on_lines(vertices, counts, beside, surfaces), counts, np.full(len(counts), _STRAIGHT)
             )
@@ -330,8 +330,6 @@ class _Surfaces:
 
 class _SurfacesAround:
     """The same of an image that looks all around: of every sector."""
-
-    flat_image = False
 
     def __init__(self, frame: Frame, labels: np.ndarray) -> None:
         self.parts = [(part, _Surfaces(part.frame, part.take(labels))) for part in sectors_of(frame)]

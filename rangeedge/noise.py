@@ -10,7 +10,7 @@ from . import _core
 from ._option import parsed, takes
 from .forms import range_array
 from .frame import Frame, read_frame
-from .noise_model import NoiseModel, correlation_of
+from .noise_model import NoiseModel, correlation_of, independent
 from .options import GEOMETRY, ScanLineParams
 from .plausible import question_geometry, warn_of_thresholds
 
@@ -37,7 +37,8 @@ def estimateNoise(src: np.ndarray, *, mask: np.ndarray | None = None, **options:
     medians exceed these by are the factors in `fits`, along rows and along columns; |D| by depth tells how the waves of
     the noise grow with it. Whoever detects edges with the model counts with that; its `correlation` sums it up.
 
-    A scanner that turns measures each of its pixels for itself: of its points the noise is white.
+    A scanner that turns measures each of its pixels for itself, and its lines are no quadratics of the number of a
+    pixel: there the factors are the lesser of rows and columns, and at most 1.5.
 
     Parameters
     ----------
@@ -92,5 +93,5 @@ def estimated(frame: Frame) -> NoiseModel:
     numbers = _core.estimate_noise(frame.ordinate, frame.projective, frame.step, frame.threads)
     (a, b, c, _), fits = numbers[:4], tuple(numbers[4:])
     if frame.ranges:
-        return NoiseModel(a, b, c)
+        fits = independent(fits)
     return NoiseModel(a, b, c, max(1.0, correlation_of(fits)), fits=fits)

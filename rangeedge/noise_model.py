@@ -14,6 +14,7 @@ from ._check import described, error, fail, named, number, public
 _LEVELS = (4, 8, 16, 32, 64)  # numbers of samples of a fit for which its noise is given
 _NEIGHBOURS = 5  # scan lines that are looked at together
 _DIRECTION = 4 * len(_LEVELS) + 1  # numbers for rows, and for columns
+_INDEPENDENT = 1.5  # the largest factor of pixels that are measured one by one
 _LONG = 64  # samples of a fit whose residuals are looked at
 _RESIDUAL = 1.25  # what residuals count more, as curves through three samples are off themselves
 _LARGEST_RESIDUAL = 12.0  # in units of the factor on slopes of the shortest fits
@@ -181,6 +182,13 @@ class NoiseModel:
         subpixel = number("subpixel", subpixel, 0, above=True)
         correlation = number("correlation", correlation, 1)
         return cls(c=subpixel / (correlation * focalLength * baseline), correlation=correlation, length=length)
+
+
+def independent(fits: tuple[float, ...]) -> tuple[float, ...]:
+    """The noise of fits where pixels are measured one by one: the lesser of rows and columns, and low."""
+    rows, columns = fits[4 : 4 + _DIRECTION], fits[4 + _DIRECTION :]
+    least = [min(row, column, _INDEPENDENT) for row, column in zip(rows, columns, strict=True)]
+    return (*fits[:4], *least, *least)
 
 
 def correlation_of(fits: tuple[float, ...]) -> float:

@@ -1,18 +1,23 @@
-"""Edges and regions of a stream of frames, as they come: a camera, a recording, or a built-in one.
+"""
+A stream of frames, as they come
+================================
 
     python samples/live.py [RECORDING [-K fx,fy,cx,cy]] [--out DIR]
     python samples/live.py --camera openni -K 570,570,319.5,239.5 --show
+
+Edges and regions of a stream of frames, as they come: a camera, a recording, or a built-in one.
 
 RECORDING is anything that `rangeedge batch` takes: a folder of images, a stack, a TUM RGB-D sequence, a ROS bag. A
 window (--show, ends with a key) needs opencv-python in the place of opencv-python-headless; without, the last picture
 is written. The detector is an object that keeps its parameters from frame to frame.
 """
 
+import argparse
 import time
+from pathlib import Path
 
 import cv2
 import numpy as np
-from common import parser, sheet, write
 
 import rangeedge
 from rangeedge.batch import framesOf
@@ -92,6 +97,31 @@ def main(argv=None):
                 break
     if shown is not None and not args.show:
         write(args.out, "live.png", shown)
+
+
+def parser(doc):
+    """Arguments of a sample: an image with its geometry, and where to write."""
+    arguments = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("image", nargs="?", help="range image; default: a built-in scene")
+    geometry = arguments.add_mutually_exclusive_group()
+    geometry.add_argument("-K", metavar="fx,fy,cx,cy", help="pinhole camera")
+    geometry.add_argument("--pixel-size", type=float, metavar="D", help="spacing of a regular grid")
+    arguments.add_argument("--height-map", action="store_true", help="larger values are nearer")
+    arguments.add_argument("--out", type=Path, default=Path("out"), help="folder for the pictures (default: out)")
+    return arguments
+
+
+def sheet(*panels, columns=2):
+    """Pictures beside each other, each under its title."""
+    return rangeedge.drawPanels(panels, columns)
+
+
+def write(folder, name, picture):
+    """Write a picture and say so."""
+    folder.mkdir(parents=True, exist_ok=True)
+    if not cv2.imwrite(str(folder / name), picture):
+        raise OSError(f"cannot write {folder / name}")
+    print(folder / name)
 
 
 if __name__ == "__main__":

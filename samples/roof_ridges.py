@@ -1,13 +1,20 @@
-"""Ridges and eaves of houses, from a surface model to a map in GeoJSON.
+"""
+Roofs of a surface model, to a map
+==================================
 
     python samples/roof_ridges.py [IMAGE] [--out DIR]
+
+Ridges and eaves of houses, from a surface model to a map in GeoJSON.
 
 An IMAGE with a georeference (GeoTIFF, ASCII grid) gives lines in its coordinates. Without one the sample makes three
 houses with gable roofs, and prints how far ridges and eaves are from the truth.
 """
 
+import argparse
+from pathlib import Path
+
+import cv2
 import numpy as np
-from common import load, parser, shown, write
 
 import rangeedge
 from rangeedge import EDGE_CONVEX, EDGE_JUMP, RangeImage
@@ -75,6 +82,46 @@ def main(argv=None):
     rangeedge.writeLines(args.out / "roof_ridges.geojson", segments, image.georeference)
     print(args.out / "roof_ridges.geojson")
     return off
+
+
+def parser(doc):
+    """Arguments of a sample: an image with its geometry, and where to write."""
+    arguments = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("image", nargs="?", help="range image; default: a built-in scene")
+    geometry = arguments.add_mutually_exclusive_group()
+    geometry.add_argument("-K", metavar="fx,fy,cx,cy", help="pinhole camera")
+    geometry.add_argument("--pixel-size", type=float, metavar="D", help="spacing of a regular grid")
+    arguments.add_argument("--height-map", action="store_true", help="larger values are nearer")
+    arguments.add_argument("--out", type=Path, default=Path("out"), help="folder for the pictures (default: out)")
+    return arguments
+
+
+def load(args):
+    """The range image, and its geometry as keywords of the functions that take it."""
+    if args.image is None:
+        return built_in_scene()
+    given = {}
+    if args.K is not None:
+        fx, fy, cx, cy = map(float, args.K.split(","))
+        given["K"] = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+    if args.pixel_size is not None:
+        given["pixelSize"] = args.pixel_size
+    if args.height_map:
+        given["heightMap"] = True
+    return rangeedge.imreadRange(args.image).withGeometry(**given)
+
+
+def shown(geometry):
+    """What pictures take of a geometry."""
+    return {name: geometry[name] for name in ("K", "heightMap") if name in geometry}
+
+
+def write(folder, name, picture):
+    """Write a picture and say so."""
+    folder.mkdir(parents=True, exist_ok=True)
+    if not cv2.imwrite(str(folder / name), picture):
+        raise OSError(f"cannot write {folder / name}")
+    print(folder / name)
 
 
 if __name__ == "__main__":

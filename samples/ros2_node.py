@@ -1,4 +1,8 @@
-"""A node of ROS 2 that publishes the edges of a depth image; and the same on a recorded bag, without ROS.
+"""
+A node of ROS 2
+===============
+
+It publishes the edges of a depth image; and the same on a recorded bag, without ROS.
 
 On a ROS machine, where `pip install rangeedge` has found the Python of ROS:
 
@@ -21,6 +25,7 @@ import numpy as np
 
 import rangeedge
 from rangeedge.recording.messages import camera_of, range_image_of
+from rangeedge.synthetic import demoScene, kinectCamera, kinectNoise, renderScene
 
 _HEADER = ("builtin_interfaces/msg/Time", "std_msgs/msg/Header")
 
@@ -94,11 +99,10 @@ def replay(bag, topic, out):
 
 def record(path, topic, frames=3):
     """A bag of the built-in scene, as a camera node would publish it."""
-    from common import built_in_scene
     from rosbags.rosbag2 import Writer
     from rosbags.typesys import Stores, get_typestore
 
-    src, geometry = built_in_scene()
+    src, geometry = kinectNoise(renderScene(demoScene(), kinectCamera()))[:2]
     rows, cols = src.shape
     store = get_typestore(Stores.ROS2_HUMBLE)
     types = {name.rpartition("/")[2]: kind for name, kind in store.types.items()}

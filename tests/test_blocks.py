@@ -148,6 +148,7 @@ class TestRuns:
         image, source = imreadRange(out / "distance.tif"), imreadRange(tmp_path / "a.tif")
         assert np.array_equal(image.georeference, source.georeference)
         assert image.geometry == source.geometry
+        assert store.attrs["georeference"] == source.georeference.tolist()
         with tifffile.TiffFile(out / "edges.tif") as file:
             assert file.pages[0].tags[34737].value == "plane|"
 

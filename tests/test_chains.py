@@ -251,7 +251,7 @@ def test_outlines_of_data_are_chains_on_request(scene, points):
     for chain in outlines:
         pixels, lengths = scene.offsets(chain, scene.owner(chain)[0])
         assert np.sqrt(np.mean(pixels**2)) < 0.05
-        assert np.sqrt(np.mean(lengths**2)) < 4e-4
+        assert np.sqrt(np.mean(lengths**2)) < 8e-4
         assert np.isnan(chain.points["behind"]).all()
         assert not chain.points["jump"].any()
         p = chain.points[len(chain) // 2]

@@ -412,3 +412,59 @@ IMAGE = np.zeros((4, 5), np.uint8)
 def test_bad_arguments_are_named(call, argument):
     with pytest.raises(rangeedge.error, match=f"`{argument}`"):
         call()
+
+
+def hoover_by_definition(labels, truth, T):
+    """Counts of correct, over, under, missed and noise from the table of all pairs, as Hoover et al. define them."""
+    table = np.array([[np.sum((labels == m) & (truth == n)) for n in range(1, truth.max() + 1)]
+                      for m in range(1, labels.max() + 1)])  # fmt: skip
+    found = np.array([np.sum(labels == m) for m in range(1, labels.max() + 1)])
+    true = np.array([np.sum(truth == n) for n in range(1, truth.max() + 1)])
+    of_found, of_true = {m: ("", -1.0) for m in range(len(found))}, {n: ("", -1.0) for n in range(len(true))}
+    for m, n in np.ndindex(table.shape):
+        if table[m, n] >= T * true[n] and table[m, n] >= T * found[m]:
+            of_found[m] = of_true[n] = "correct", (table[m, n] / true[n] + table[m, n] / found[m]) / 2
+    for n in range(len(true)):
+        parts = [m for m in range(len(found)) if table[m, n] >= T * found[m]]
+        covered = table[parts, n].sum()
+        measure = (covered / true[n] + covered / found[parts].sum()) / 2 if parts else 0
+        if len(parts) > 1 and covered >= T * true[n] and measure > of_true[n][1]:
+            of_true[n] = "over", measure
+            of_found |= {m: ("over", measure) for m in parts}
+    for m in range(len(found)):
+        parts = [n for n in range(len(true)) if table[m, n] >= T * true[n]]
+        covered = table[m, parts].sum()
+        measure = (covered / true[parts].sum() + covered / found[m]) / 2 if parts else 0
+        if len(parts) > 1 and covered >= T * found[m] and measure > of_found[m][1]:
+            of_found[m] = "under", measure
+            of_true |= {n: ("under", measure) for n in parts}
+    roles_found, roles_true = [role for role, _ in of_found.values()], [role for role, _ in of_true.values()]
+    return [roles_true.count("correct"), roles_true.count("over"), roles_found.count("under"),
+            roles_true.count(""), roles_found.count("")]  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_hoover_scores_are_those_of_the_definition(seed):
+    rng = np.random.default_rng(seed)
+    v, u = np.indices((24, 30))
+
+    def blocks():
+        sizes = rng.choice([3, 4, 6, 8, 12, 24], 2)
+        image = u // sizes[0] + 10 * (v // sizes[1]) + 1
+        image[rng.random(image.shape) < 0.05] = 0
+        return np.unique(image, return_inverse=True)[1].reshape(image.shape).astype(np.int32)
+
+    labels, truth = blocks(), blocks()
+    for T in (0.51, 0.75, 0.9):
+        scores = hooverScores(labels, truth, T=T)
+        counts = [scores.correct, scores.over, scores.under, scores.missed, scores.noise]
+        assert counts == hoover_by_definition(labels, truth, T)
+
+
+def test_two_parts_of_half_a_region_are_no_oversegmentation():
+    truth, labels = np.ones((10, 20), np.int32), np.zeros((10, 20), np.int32)
+    labels[:, :5], labels[:, 5:10] = 1, 2
+    scores = hooverScores(labels, truth)
+    assert (scores.over, scores.missed, scores.noise) == (0, 1, 2)
+    labels[:, 10:18] = 3
+    assert hooverScores(labels, truth).over == 1

@@ -175,3 +175,43 @@ def test_points_in_no_order_at_all(shape, decades):
     for function in (rangeedge.detectEdges, rangeedge.segmentRegions):
         with contextlib.suppress(rangeedge.error):
             assert function(points).shape == shape
+
+
+@pytest.mark.skipif(not hasattr(os, "O_TMPFILE"), reason="there are no files without a name")
+@pytest.mark.parametrize("existing", [False, True])
+def test_a_program_killed_while_it_writes_leaves_nothing(existing, tmp_path, monkeypatch):
+    """Whatever is written up to then has no name yet."""
+    from rangeedge.app import results
+    from rangeedge.io import atomic
+
+    seen = []
+
+    def look(folder, data):
+        file = atomic.nameless(folder, data)
+        seen.append(sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*")))
+        return file
+
+    if existing:
+        results.write_folder(tmp_path / "out", {"old.txt": b"old"})
+    before = sorted(str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*"))
+    monkeypatch.setattr(results, "nameless", look)
+    results.write_folder(tmp_path / "out", {"a.txt": b"a" * 10**6, "report.json": b"{}"})
+    assert seen == [before, before]
+    assert (tmp_path / "out/a.txt").read_bytes() == b"a" * 10**6
+    assert not [path for path in tmp_path.rglob("*") if path.suffix == ".tmp"]
+
+
+def test_labels_that_no_table_has_room_for():
+    labels = np.where(DEPTH > 1.5, 2**30, 1).astype(np.int32)
+    for call in (lambda: rangeedge.regionAdjacency(DEPTH, labels), lambda: rangeedge.drawRegions(labels)):
+        with pytest.raises(rangeedge.error, match="labels of up to 65535"):
+            call()
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.int32, np.uint8])
+def test_a_destination_of_another_type_is_left_alone(dtype):
+    dst = np.full(DEPTH.shape, 7, dtype)
+    found = rangeedge.distanceTransform(DEPTH > 1.5, dst=dst)
+    assert found is not dst
+    assert found.dtype == np.float32
+    assert (dst == 7).all()

@@ -291,6 +291,16 @@ class TestBags:
         assert {frame.part.split()[0] for frame in frames} == {"/a/image"}
         assert len(frames) == 4
 
+    def test_infrared_pictures_are_taken_only_where_they_are_named(self, kind, tmp_path):
+        def infrared(types, first):
+            message = image_message(depths()[0])(types, first)
+            message.encoding = "mono16"
+            return message
+
+        bag = self.bag(kind, tmp_path, ("/depth/image", 1, image_message(depths()[0])), ("/ir/image", 1, infrared))
+        assert [frame.part for frame in framesOf(bag)] == ["/depth/image at 1"]
+        assert_frames(framesOf(bag, topics=["/ir/image"]), depths(1))
+
     def test_frames_of_one_time_are_two(self, kind, tmp_path):
         frames = framesOf(self.bag(kind, tmp_path, *[("/a", 7, image_message(depth)) for depth in depths(2)]))
         assert names(frames) == ["walk/a/7", "walk/a/7_1"]

@@ -11,7 +11,7 @@ import pytest
 
 import rangeedge
 from rangeedge import EDGE_CONVEX, EDGE_JUMP, detectEdges, imreadRange, imwriteRange, readLines
-from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
+from rangeedge.synthetic import box, demoScene, kinectCamera, kinectNoise, pinholeCamera, plane, renderScene
 
 SAMPLES = Path(__file__).resolve().parents[1] / "samples"
 PICTURES = {
@@ -31,7 +31,7 @@ PICTURES = {
     "stair_edges": ["stair_edges.png"],
     "live": ["live.png"],
 }
-OTHERS = {"calibration", "camera", "common", "elevation", "paper", "ros2_node", "scan_line", "scores", "tune"}
+OTHERS = {"calibration", "camera", "elevation", "paper", "ros2_node", "scan_line", "scores", "tune"}
 
 
 @pytest.fixture(autouse=True)
@@ -212,7 +212,7 @@ def test_the_node_publishes_the_edges_of_a_bag(tmp_path, capsys):
 
     run("ros2_node", "--out", tmp_path)
     assert "edges of 3 images" in capsys.readouterr().out
-    src, geometry = importlib.import_module("common").built_in_scene()
+    src, geometry = kinectNoise(renderScene(demoScene(), kinectCamera()))[:2]
     edges = detectEdges(src, **geometry)
     with AnyReader([tmp_path / "edges"]) as reader:
         messages = [reader.deserialize(data, connection.msgtype) for connection, _, data in reader.messages()]

@@ -61,6 +61,19 @@ def test_a_room_all_around(rows, noise, tilt):
         assert near(truth, edges) >= 0.95
 
 
+def test_a_pillar_has_an_outline_and_no_creases():
+    rays, ranges, faces = sweep(64, 22.5, (45, -45))
+    across, toward = (rays[..., :2] ** 2).sum(axis=2), rays[..., :2] @ (2.5, 1.0)
+    inside = toward**2 - across * (2.5**2 + 1 - 0.25**2)
+    there = np.where(inside > 0, (toward - np.sqrt(np.maximum(inside, 0))) / across, np.inf)
+    faces = np.where(there < ranges, 6, faces)
+    ranges = np.minimum(there, ranges) + 0.005 * np.random.default_rng(0).standard_normal(ranges.shape)
+    edges, truth = detectEdges(rays * ranges[..., None]) > 0, borders(faces)
+    truth[:, [0, -1]] = False  # no neighbours here
+    assert near(edges, truth, 3) > 0.97
+    assert near(truth, edges, 3) > 0.97
+
+
 def test_walls_meet_at_right_angles_and_the_seam_is_no_border():
     rays, ranges, faces = sweep(128, 10, (180, -180))
     turn = COLUMNS // 2 - int(np.argmax(faces[64] != np.roll(faces[64], 1)))

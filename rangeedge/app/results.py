@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import io
 import json
@@ -26,6 +27,7 @@ from ..distance import distanceTransform
 from ..draw import drawOverview, drawRegions, region_overview
 from ..edges import EdgeStrength, measure_both
 from ..frame import Frame
+from ..io.atomic import nameless, put
 from ..io.lines import encoded_lines
 from ..noise import measured_frame
 from ..options import DETECTION, Growing, ScanLineParams, Selection
@@ -239,18 +241,22 @@ def _surfaces_csv(stats: np.ndarray, surfaces: np.ndarray) -> bytes:
 def write_folder(out: str | os.PathLike[str], files: Mapping[str, bytes]) -> None:
     """Write files into a folder, which is made where it is missing.
 
-    Complete under temporary names first, then renamed: no reader ever sees a part of a file, and a new folder appears
-    with all of them or not at all. In an existing folder they are replaced one by one, where the report is removed
-    first and comes last: a folder that has one holds results of one run.
+    Complete without names first, or under temporary ones, then renamed: no reader ever sees a part of a file, and a new
+    folder appears with all of them or not at all. In an existing folder they are replaced one by one, where the report
+    is removed first and comes last: a folder that has one holds results of one run.
     """
     out = Path(out)
     ancestor = next(path for path in (out, *out.absolute().parents) if path.exists())
     stage = ancestor / f".{uuid.uuid4().hex}.tmp"
     try:
-        stage.mkdir()
-        try:
+        with contextlib.ExitStack() as stack:
+            whole = {name: nameless(ancestor, data) for name, data in files.items()}
+            for file in filter(None, whole.values()):
+                stack.enter_context(file)
+            stage.mkdir()
+            stack.callback(shutil.rmtree, stage, ignore_errors=True)
             for name, data in files.items():
-                (stage / name).write_bytes(data)
+                put(stage / name, whole[name], data)
             if out.exists():
                 (out / _REPORT).unlink(missing_ok=True)
                 for name in sorted(files, key=lambda name: name == _REPORT):  # the report comes last
@@ -258,8 +264,6 @@ def write_folder(out: str | os.PathLike[str], files: Mapping[str, bytes]) -> Non
             else:
                 out.absolute().parent.mkdir(parents=True, exist_ok=True)
                 stage.rename(out)
-        finally:
-            shutil.rmtree(stage, ignore_errors=True)
     except (OSError, ValueError) as reason:
         what = getattr(reason, "strerror", None) or reason
         raise error(f"cannot write to {os.fspath(out)!r}: {what}", cv2.Error.StsError) from reason

@@ -91,5 +91,5 @@ def told_warnings(flag: Callable[[str], str]) -> Iterator[None]:
             text = re.sub(rf"\b({'|'.join(DETECTION)})\b", lambda name: flag(name[0]), text)
             print(f"rangeedge: warning: {text}", file=sys.stderr)
 
-        warnings.showwarning = tell
+        warnings.showwarning = tell  # type: ignore[assignment]
         yield

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import stat
 import uuid
 from pathlib import Path
+from typing import BinaryIO
 
 
 def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
@@ -18,8 +20,7 @@ def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:
     _expect_replaceable(target)
     temporary = target.with_name(f".{uuid.uuid4().hex}.tmp")
     try:
-        if not _write_nameless(temporary, data):
-            temporary.write_bytes(data)
+        put(temporary, nameless(target.parent, data), data)
         os.replace(temporary, target)
     except BaseException:
         temporary.unlink(missing_ok=True)
@@ -36,20 +37,29 @@ def _expect_replaceable(target: Path) -> None:
         raise OSError(f"{str(target)!r} is not a file")
 
 
-def _write_nameless(temporary: Path, data: bytes) -> bool:
-    """Writes to a file that gets its name when it is complete; False where there are no such files."""
+def nameless(folder: Path, data: bytes) -> BinaryIO | None:
+    """A complete file without a name, which is gone once it is closed or the process killed; None where none can be."""
     if not hasattr(os, "O_TMPFILE"):
-        return False
+        return None
     try:
-        descriptor = os.open(temporary.parent, os.O_WRONLY | os.O_TMPFILE, 0o666)
+        descriptor = os.open(folder, os.O_WRONLY | os.O_TMPFILE, 0o666)
     except OSError:
-        return False
-    with os.fdopen(descriptor, "wb") as file:
+        return None
+    file = os.fdopen(descriptor, "wb")
+    try:
         file.write(data)
         file.flush()
-        try:
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def put(path: Path, file: BinaryIO | None, data: bytes) -> None:
+    """Give `path` to a nameless file of that content; write the content there where that cannot be."""
+    if file is not None:
+        with file, contextlib.suppress(OSError):
             # With a descriptor, which an absolute path makes idle, Python calls linkat, which follows the link.
-            os.link(f"/proc/self/fd/{descriptor}", temporary, src_dir_fd=descriptor, follow_symlinks=True)
-        except OSError:
-            return False
-    return True
+            os.link(f"/proc/self/fd/{file.fileno()}", path, src_dir_fd=file.fileno(), follow_symlinks=True)
+            return
+    path.write_bytes(data)

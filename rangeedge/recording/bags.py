@@ -103,7 +103,9 @@ def _depths(reader: Any, connections: list[Any]) -> list[Any]:
 
 
 def _is_depth(message: Any) -> bool:
-    """Whether it is no picture in colours, and no cloud without rows."""
+    """Whether it is no picture in colours or of infrared light, and no cloud without rows."""
+    if getattr(message, "encoding", None) == "mono16":
+        return False
     try:
         range_image_of(message)
     except ValueError:

@@ -124,7 +124,8 @@ Crossings assign_candidates(const std::vector<Candidate>& candidates, const Trac
     for (std::ptrdiff_t i = 0; i < nearest.size(); ++i) {
         checkpoints.pass();
         const Candidate& c = candidates[static_cast<std::size_t>(i)];
-        // The line along a jump lies on its nearer side, which a smeared step is far from, and an outline on that of data.
+        // The line along a jump lies on its nearer side, which a smeared step is far from, and an outline on that of
+        // the data.
         const std::int32_t near = c.kind & occluding_bit ? c.before : c.after;
         const bool jumps = c.kind & (jump_bit | boundary_bit);
         const int col = jumps ? near % cols : static_cast<int>(std::lround(c.x));

@@ -48,7 +48,7 @@ ChainSamples gather_samples(const Piece& chain, const std::vector<Candidate>& ca
             const Candidate& c = candidates[static_cast<std::size_t>(crossings.candidates[k])];
             if (belongs(c, chain.type)) result.samples.push_back({&c, i - first, false});
         }
-    for (Sample& s : result.samples) {
+    for (ChainSample& s : result.samples) {
         const Point& a = means[result.neighbour(s.place, -tangent_reach)];
         const Point& b = means[result.neighbour(s.place, tangent_reach)];
         const Point step = scan_step(*s.candidate);

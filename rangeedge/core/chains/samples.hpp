@@ -13,7 +13,7 @@ namespace rangeedge {
 constexpr std::ptrdiff_t most_frayed = 6;  // places at an end that may lead off
 constexpr int tangent_reach = 3;           // places on either side that tell the direction at one
 
-struct Sample {
+struct ChainSample {
     const Candidate* candidate;
     std::ptrdiff_t place;
     bool before_left;  // whether what is before the cut is on the left of the chain
@@ -21,7 +21,7 @@ struct Sample {
 
 struct ChainSamples {
     Array<Point> means;  // positions, of every place
-    Array<Sample> samples;
+    Array<ChainSample> samples;
     bool closed = false;
 
     std::ptrdiff_t places() const { return means.size(); }

@@ -79,7 +79,7 @@ private:
         const int reach = parabola_reach();
         Array<double> values;
         for (const int axis : {0, 1}) {
-            fill([&](const Sample& s) { return static_cast<double>(axis ? s.candidate->y : s.candidate->x); });
+            fill([&](const ChainSample& s) { return static_cast<double>(axis ? s.candidate->y : s.candidate->x); });
             smooth_parabolas(channel_, places(), closed_, reach, values);
             for (std::ptrdiff_t k = 0; k < places(); ++k) (axis ? point(k).y : point(k).x) = values[k];
         }
@@ -97,7 +97,7 @@ private:
         AffineFit fit{};
         for (const bool last : {false, true}) {
             channel_.clear();
-            for (const Sample& s : samples_) {
+            for (const ChainSample& s : samples_) {
                 if (beside_corner(s)) continue;
                 const double x = static_cast<double>(s.candidate->x), y = static_cast<double>(s.candidate->y);
                 channel_.push_back({s.place, line.along(x, y), line.off(x, y), weight(s, line)});
@@ -126,7 +126,7 @@ private:
     // The pixels beside each candidate of a jump, on the two sides of a line.
     Array<PixelPair> pixel_pairs(const StraightLine& line) const {
         Array<PixelPair> pairs;
-        for (const Sample& s : samples_) {
+        for (const ChainSample& s : samples_) {
             const auto place = [&](std::int32_t pixel) {
                 const double x = pixel % frame_.cols, y = pixel / frame_.cols;
                 return Point{line.along(x, y), line.off(x, y)};
@@ -141,12 +141,12 @@ private:
     }
 
     // There scan lines are short, and bend creases.
-    bool beside_corner(const Sample& s) const {
+    bool beside_corner(const ChainSample& s) const {
         const std::ptrdiff_t reach = std::min(most_frayed, places() / least_share_inside);
         return !jumps_ && (s.place < reach || s.place >= places() - reach);
     }
 
-    double weight(const Sample& s, const StraightLine& line) const {
+    double weight(const ChainSample& s, const StraightLine& line) const {
         if (!jumps_) return 1;
         const Point step = scan_step(*s.candidate);
         const double across = step.y * line.dx - step.x * line.dy;
@@ -173,7 +173,7 @@ private:
     template <class Value>
     void fill(Value&& value) {
         channel_.clear();
-        for (const Sample& s : samples_) {
+        for (const ChainSample& s : samples_) {
             const double v = value(s);
             if (std::isfinite(v)) channel_.push_back({s.place, positions_.empty() ? 0 : positions_[s.place], v, 1});
         }
@@ -207,7 +207,7 @@ private:
             to_plane(p.x, p.y, p.plane);
         }
         for (int axis = 0; frame_.points && axis < 2; ++axis) {
-            fill([&](const Sample& s) { return static_cast<double>(s.candidate->plane_position[axis]); });
+            fill([&](const ChainSample& s) { return static_cast<double>(s.candidate->plane_position[axis]); });
             smooth_channel(0, [axis](ChainPoint& p, double v) { p.plane[axis] = v; });
         }
     }
@@ -220,14 +220,16 @@ private:
     }
 
     // Not at an end of a straight chain, where scan lines cross other edges nearby.
-    bool inside(const Sample& s) const {
+    bool inside(const ChainSample& s) const {
         if (!result_.straight || places() < 4 * end_places) return true;
         return s.place >= end_places && s.place < places() - end_places;
     }
 
     static bool has_sides(const Candidate& c) { return c.sides[0].slope_variance > 0 || c.sides[1].slope_variance > 0; }
 
-    const Side& side_of(const Sample& s, int side) const { return s.candidate->sides[(side == 0) != s.before_left]; }
+    const Side& side_of(const ChainSample& s, int side) const {
+        return s.candidate->sides[(side == 0) != s.before_left];
+    }
 
     double ordinate_at(std::int32_t pixel) const {
         if (frame_.ordinate) return static_cast<double>(frame_.ordinate[pixel]);
@@ -244,7 +246,7 @@ private:
     }
 
     // Of a surface beside an edge, moved along the scan line to where the candidate was moved.
-    double ordinate(const Sample& s, int side) const {
+    double ordinate(const ChainSample& s, int side) const {
         const Candidate& c = *s.candidate;
         if (!has_sides(c)) {
             const double near = ordinate_at(c.kind & occluding_bit ? c.before : c.after),
@@ -270,7 +272,7 @@ private:
     }
 
     void find_ordinates(int side) {
-        fill([&](const Sample& s) { return inside(s) ? ordinate(s, side) : nan; });
+        fill([&](const ChainSample& s) { return inside(s) ? ordinate(s, side) : nan; });
         double sum = 0;
         for (const ChannelSample& s : channel_) sum += std::abs(s.value);
         const double allowed = ordinate_aside * sum / static_cast<double>(std::max<std::ptrdiff_t>(channel_.size(), 1));
@@ -280,7 +282,7 @@ private:
     void find_gradients(int side) {
         Array<SlopeSums> sums(places() + 1);
         SlopeSums all;
-        for (const Sample& s : samples_) {
+        for (const ChainSample& s : samples_) {
             const Side& own = side_of(s, side);
             if (!inside(s) || !has_sides(*s.candidate) || !(own.slope_variance > 0) || !(own.slope_variance < endless))
                 continue;
@@ -320,7 +322,7 @@ private:
     void find_measured() {
         Array<int> counts(places(), 0);
         for (ChainPoint& p : result_.points) std::fill_n(p.measured, 3, 0.0);
-        for (const Sample& s : samples_) {
+        for (const ChainSample& s : samples_) {
             const double value = jumps_ ? ordinate(s, 0) : (ordinate(s, 0) + ordinate(s, 1)) / 2;
             if (!std::isfinite(value)) continue;
             ChainPoint& p = point(s.place);
@@ -335,7 +337,7 @@ private:
     }
 
     void find_significance() {
-        for (const Sample& s : samples_) {
+        for (const ChainSample& s : samples_) {
             double& most = point(s.place).significance;
             most = std::max(most, static_cast<double>(s.candidate->significance));
         }
@@ -354,7 +356,7 @@ private:
     const Frame<T>& frame_;
     const ChainSamples gathered_;
     const Array<Point>& means_;
-    const Array<Sample>& samples_;
+    const Array<ChainSample>& samples_;
     bool closed_, jumps_, affine_[2] = {false, false}, gradients_known_ = false;
     Array<double> positions_;  // along the straight line, else the numbers of places
     Array<ChannelSample> channel_;

@@ -39,11 +39,11 @@ private:
     };
 
     bool lies_on(const Pixels& pixels, const Surface& surface) const;
-    bool are_one(const Border& border) const;
+    bool are_one(const OpenBorder& border) const;
     void tidy();
     void verify();
     void align();
-    void align(const Border& border);
+    void align(const OpenBorder& border);
     const Part& part(int number) const { return of_part_[static_cast<std::size_t>(number)]; }
 
     SurfaceImage image_;
@@ -94,12 +94,12 @@ void Closer::verify() {
 }
 
 void Closer::align() {
-    for (const Border& border : parts_.borders())
+    for (const OpenBorder& border : parts_.borders())
         if (part(border.first).verified && part(border.second).verified) align(border);
 }
 
 // Where one surface passes through the other, it is above on one side of the border and below on the other.
-void Closer::align(const Border& border) {
+void Closer::align(const OpenBorder& border) {
     const Surface &a = part(border.first).surface, &b = part(border.second).surface;
     const auto above = [&](int p) {
         const Sample s = image_.sample(p);
@@ -119,10 +119,12 @@ void Closer::align(const Border& border) {
     for (const auto& [p, distance] : near) parts_.set(p, above(p) == first_above ? border.first : border.second);
 }
 
-// Whether either surface is that of the other part, too.
-bool Closer::are_one(const Border& border) const {
-    return lies_on(parts_.pixels(border.second), part(border.first).surface) &&
-           lies_on(parts_.pixels(border.first), part(border.second).surface);
+// Whether the smaller part lies on the surface of the larger one.
+bool Closer::are_one(const OpenBorder& border) const {
+    const bool first_larger = parts_.pixels(border.first).size() >= parts_.pixels(border.second).size();
+    const int larger = first_larger ? border.first : border.second,
+              smaller = first_larger ? border.second : border.first;
+    return lies_on(parts_.pixels(smaller), part(larger).surface);
 }
 
 void Closer::draw(std::uint8_t* lines) {
@@ -130,7 +132,7 @@ void Closer::draw(std::uint8_t* lines) {
         const int row = p / image_.stride() - 1, col = p % image_.stride() - 1;
         lines[std::ptrdiff_t{row} * image_.cols() + col] = 255;
     };
-    for (const Border& border : parts_.borders()) {
+    for (const OpenBorder& border : parts_.borders()) {
         if (!part(border.first).verified || !part(border.second).verified || are_one(border)) continue;
         for (const Pixels& line : parts_.lines(border)) {
             int top = image_.rows(), bottom = 0, left = image_.cols(), right = 0;

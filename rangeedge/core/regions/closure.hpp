@@ -1,7 +1,7 @@
 // Contour closure: lines across the gaps between edges, where the surfaces on their two sides meet or part.
 //
-//   divide   what is no edge falls into parts, each of one region; slivers that lie beside an edge, on the wrong side of
-//            it, go to the part that they are open to
+//   divide   what is no edge falls into parts, each of one region; slivers that lie beside an edge, on the wrong side
+//            of it, go to the part that they are open to
 //   verify   most pixels of a part lie on its surface, by what lies off the surfaces of all
 //   align    where surfaces meet, the border between two parts lies where one passes through the other
 //   draw     what is left of open borders between verified parts, as far as a gap is wide at most

@@ -113,7 +113,7 @@ void OpenParts::trim_spurs() {
     };
     // What no pixel of another part is near, and what is near that.
     Pixels beside, inside, rest;
-    for (const Border& border : borders()) beside.insert(beside.end(), border.pixels.begin(), border.pixels.end());
+    for (const OpenBorder& border : borders()) beside.insert(beside.end(), border.pixels.begin(), border.pixels.end());
     for (const int p : beside)
         around(p, [&](int q) {
             if (part_[q] && !marked_[q]) marked_[q] = 1, rest.push_back(q);
@@ -144,7 +144,7 @@ void OpenParts::trim_spurs() {
     number();
 }
 
-std::vector<Border> OpenParts::borders() const {
+std::vector<OpenBorder> OpenParts::borders() const {
     std::map<std::pair<int, int>, Pixels> found;
     for (int row = 0; row < image_.rows(); ++row) {
         Watch::checkpoint();
@@ -156,12 +156,12 @@ std::vector<Border> OpenParts::borders() const {
                 if (pixels.empty() || pixels.back() != p) pixels.push_back(p);
             }
     }
-    std::vector<Border> result;
+    std::vector<OpenBorder> result;
     for (auto& [pair, pixels] : found) result.push_back({pair.first, pair.second, std::move(pixels)});
     return result;
 }
 
-std::vector<std::pair<int, int>> OpenParts::near(const Border& border, int reach) {
+std::vector<std::pair<int, int>> OpenParts::near(const OpenBorder& border, int reach) {
     std::vector<std::pair<int, int>> found;
     for (const int p : border.pixels) marked_[p] = 1, found.emplace_back(p, 0);
     for (std::size_t i = 0; i < found.size(); ++i) {
@@ -177,7 +177,7 @@ std::vector<std::pair<int, int>> OpenParts::near(const Border& border, int reach
     return found;
 }
 
-std::vector<Pixels> OpenParts::lines(const Border& border) {
+std::vector<Pixels> OpenParts::lines(const OpenBorder& border) {
     const auto is_other = [&](int p, int q) {
         return part_[q] != part_[p] && (part_[q] == border.first || part_[q] == border.second);
     };

@@ -12,7 +12,7 @@
 namespace rangeedge {
 
 // Where two parts are open to each other: neighbours of either without an edge between them.
-struct Border {
+struct OpenBorder {
     int first, second;  // parts, first < second
     Pixels pixels;      // of both
 };
@@ -32,11 +32,11 @@ public:
     void trim_spurs();
     void set(int p, int part) { part_[p] = part; }
 
-    std::vector<Border> borders() const;
+    std::vector<OpenBorder> borders() const;
     // The pixels of both parts up to `reach` steps from their border, and how far they are.
-    std::vector<std::pair<int, int>> near(const Border& border, int reach);
+    std::vector<std::pair<int, int>> near(const OpenBorder& border, int reach);
     // The connected lines of pixels that part the two: those of a border left of or above one of the other part.
-    std::vector<Pixels> lines(const Border& border);
+    std::vector<Pixels> lines(const OpenBorder& border);
 
 private:
     void number();

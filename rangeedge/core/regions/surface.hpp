@@ -57,8 +57,8 @@ public:
         square_ += w * f * f;
         ++count_;
     }
-    // n samples of a column at x, of which the sums over v = y - y0 and f = ordinate - base are known: of w v^0 ... w v^4,
-    // of w f v^0 ... w f v^2, and of w f^2.
+    // n samples of a column at x, of which sums are known, with v = y - y0 and f = ordinate - base: those of w v^0 to
+    // w v^4, of w f v^0 to w f v^2, and of w f^2.
     void add_column(double x, int n, const std::array<double, 5>& w, const std::array<double, 3>& wf, double wff) {
         const double u = x - x0_, uu = u * u, uuu = u * uu;
         power_[0] += w[0], power_[1] += u * w[0], power_[2] += w[1], power_[3] += uu * w[0], power_[4] += u * w[1];

@@ -2,6 +2,7 @@
 #include "regions/tiles.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -70,8 +71,24 @@ SurfaceSums Tiles::add_up(int t) const {
             if (!image_.open(p)) return {};
     const Sample middle = image_.sample(first + (side_ / 2) * (stride + 1));
     SurfaceSums sums(middle.x, middle.y, middle.ordinate);
-    for (int row = 0; row < side_; ++row)
-        for (int p = first + row * stride, end = p + side_; p < end; ++p) sums.add(image_.sample(p));
+    for (int col = 0; col < side_; ++col) {
+        const double x = image_.sample(first + col).x;
+        std::array<double, 5> w{};
+        std::array<double, 3> wf{};
+        double wff = 0;
+        for (int row = 0; row < side_; ++row) {
+            const Sample s = image_.sample(first + col + row * stride);
+            if (!image_.regular()) {
+                sums.add(s);
+                continue;
+            }
+            const double v = row - side_ / 2, vv = v * v, f = s.ordinate - middle.ordinate, p = s.weight * f;
+            w[0] += s.weight, w[1] += s.weight * v, w[2] += s.weight * vv;
+            w[3] += s.weight * (v * vv), w[4] += s.weight * (vv * vv);
+            wf[0] += p, wf[1] += p * v, wf[2] += p * vv, wff += p * f;
+        }
+        if (image_.regular()) sums.add_column(x, side_, w, wf, wff);
+    }
     return sums;
 }
 
@@ -118,7 +135,7 @@ TilePyramid::TilePyramid(const SurfaceImage& image, Team& team) : large(image, 8
         Array<SurfaceSums> quarters(2 * small.cols());
         for (int row = first; row < last; ++row) {
             const int two = std::min(2, small.rows() - 2 * row);
-            for (int k = 0; k < two; ++k) small.add_up_row(2 * row + k, &quarters[k * small.cols()]);
+            for (int k = 0; k < two; ++k) small.add_up_row(2 * row + k, quarters.data() + k * small.cols());
             for (int k = 0; k < two * small.cols(); ++k)
                 if (quarters[k].count()) small.set(2 * row * small.cols() + k, quarters[k]);
             for (int col = 0; row < large.rows() && col < large.cols(); ++col) {

