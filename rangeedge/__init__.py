@@ -8,7 +8,7 @@ First steps
 >>> depth[120:360, 160:480] = 1200
 >>> edges = rangeedge.detectEdges(depth, K=(525, 525, 319.5, 239.5))  # 0 and 255, one pixel wide
 >>> int(np.count_nonzero(edges))
-1116
+1112
 
 The image is depths of a camera (`K`), heights or depths on a grid (`pixelSize`, `heightMap=True`), or organized points
 (H, W, 3). `imreadRange` reads files. Thresholds follow the noise of the image; `explainPixel` says why a pixel is an
