@@ -103,6 +103,20 @@ def test_oracle_with_ties_and_mask(seed):
     assert as_sets(markers) == oracle(np.where(mask, distance, 0), 2.0, 0.5)
 
 
+@pytest.mark.parametrize("threads", [1, 5])
+@pytest.mark.parametrize("seed", range(2))
+def test_ways_uphill_that_cross_the_rows_of_every_thread(seed, threads):
+    smooth = cv2.GaussianBlur(np.random.default_rng(seed).random((60, 300)), (0, 0), 8)
+    distance = (200 * (smooth - smooth.min())).astype(np.float32)
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(threads)
+    try:
+        markers = extractSeeds(distance, minDistance=2.0, separation=0.8)[1]
+    finally:
+        cv2.setNumThreads(before)
+    assert as_sets(markers) == oracle(distance, 2.0, 0.8)
+
+
 def test_threads_do_not_matter():
     distance = distanceTransform(random_edges(7, (300, 400), 0.002))
     threads = cv2.getNumThreads()

@@ -212,7 +212,11 @@ DistanceImage::Basins DistanceImage::basins() const {
         number[static_cast<std::size_t>(basins.summits[k])] = static_cast<int>(k);
     Array<int> summit(level_.size(), -1);
     parallel_for(rows_, team_, [&](int first, int last, int) {
-        for_pixels(first, last, [&](int p) { summit[p] = number[static_cast<std::size_t>(uphill[uphill[p]])]; });
+        for_pixels(first, last, [&](int p) {
+            int q = uphill[p];
+            while (uphill[q] != q) q = uphill[q];
+            summit[p] = number[static_cast<std::size_t>(q)];
+        });
     });
     copy_around(summit);
     uphill.swap(summit);
