@@ -37,7 +37,7 @@ SLIDERS = {  # name: least, largest, step
     "epsFactor": (0.5, 20.0, 0.5),
     "mergeSignificance": (0.0, 10.0, 0.5),
     "maxGap": (0, 60, 1),
-    "maxShift": (0.0, 10.0, 0.5),
+    "maxShift": (0.0, 20.0, 0.5),
 }
 SWITCHES = ("boundaryEdges", "dynamic", "shadowEdges")
 

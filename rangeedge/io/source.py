@@ -46,12 +46,12 @@ def file_name(path: Any, argument: str = "path") -> str:
 
 
 @contextmanager
-def opened(name: str, limit: float = FILE_LIMIT) -> Iterator[tuple[BinaryIO, int]]:
+def opened(name: str, limit: float | None = None) -> Iterator[tuple[BinaryIO, int]]:
     """A regular file and its size. Whatever goes wrong inside is an error that names the file."""
     try:
         with _regular(name) as stream:
             size = os.fstat(stream.fileno()).st_size
-            if size > limit:
+            if size > (FILE_LIMIT if limit is None else limit):
                 raise ValueError(f"it has {size} bytes, more than the 4 GiB that are read")
             yield stream, size
     except OSError as reason:
