@@ -10,6 +10,7 @@ with its segments at three tolerances. Dotted lines are the defaults. Needs matp
 """
 
 import argparse
+from inspect import signature
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ SWEEPS = {
     "epsFactor": (1.5, 2.5, 3.5, 5, 8, 14, 25),
     "minSignificance": (0, 3, 5, 7, 10, 15, 25),
     "creaseThreshold": (8, 15, 20, 30, 40, 60, 90),
-    "lineSignificance": (0, 7, 14, 25, 40, 60, 100),
+    "lineSignificance": (0, 10, 20, 30, 40, 60, 100),
 }
 BLUE, VERMILION, GREEN = "#0072B2", "#D55E00", "#009E73"
 
@@ -65,8 +66,7 @@ def draw_curve(axes, name, curve):
     places = np.arange(len(curve))
     axes.plot(places, curve[:, 1], "o-", color=BLUE, label="precision")
     axes.plot(places, curve[:, 0], "s--", color=VERMILION, label="recall")
-    defaults = {"creaseThreshold": 30.0, "lineSignificance": 14.0}
-    default = defaults.get(name) or getattr(rangeedge.ScanLineParams(), name)
+    default = signature(rangeedge.detectEdges).parameters[name].default
     axes.axvline(np.interp(default, SWEEPS[name], places), color="0.4", linestyle=":")
     axes.set(title=name, xticks=places, xticklabels=[f"{value:g}" for value in SWEEPS[name]], ylim=(0, 1.03))
     axes.grid(color="0.9")
