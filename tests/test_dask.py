@@ -142,7 +142,8 @@ def test_a_scheduler_that_is_started_anew_costs_nothing(recording, undisturbed, 
 
     def start(*argv):
         command = [sys.executable, "-m", "distributed.cli." + argv[0], *argv[1:]]
-        process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+        process = subprocess.Popen(command, cwd=PACKAGE, env=environment, **silent)
         running.append(process)
         return process
 

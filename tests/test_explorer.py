@@ -18,6 +18,8 @@ from rangeedge.app.cli import main
 from rangeedge.explorer.session import SLIDERS, SWITCHES, VIEWS, Session
 from rangeedge.options import DETECTION
 
+PACKAGE = Path(rangeedge.__file__).parents[1]
+
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 FLAGS = "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking"
 FLAGS += " --disable-component-update --disable-sync --window-size=1500,1100"
@@ -111,7 +113,8 @@ def page(tmp_path):
         port = free.getsockname()[1]
     command = [sys.executable, "-m", "rangeedge", "explore", "--no-browser", "--port", str(port)]
     environment = {name: value for name, value in os.environ.items() if "PYTEST" not in name}  # which NiceGUI minds
-    server = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    server = subprocess.Popen(command, cwd=PACKAGE, env=environment, **silent)
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM
     for flag in [*FLAGS.split(), f"--user-data-dir={tmp_path / 'profile'}"]:

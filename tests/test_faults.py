@@ -98,9 +98,8 @@ def command(recording, out, *more):
 
 
 def started(argv, **more):
-    environment = {**os.environ, "PYTHONPATH": str(PACKAGE)}
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
-    return subprocess.Popen([sys.executable, "-m", "rangeedge", *argv], env=environment, **pipes, **more)
+    return subprocess.Popen([sys.executable, "-m", "rangeedge", *argv], cwd=PACKAGE, **pipes, **more)
 
 
 def await_lines(out, count, process):
