@@ -72,7 +72,8 @@ def main(argv=None):
     print(f"{len(found.segments)} edges, {len(found.vertices)} corners")
     for i, (length, deviation, count) in enumerate(sizes):
         truth = f", truth {SIZE[i]:.4f}, error {1000 * (length - SIZE[i]):+.2f} mm" if rendered else ""
-        print(f"{length:.4f} +- {deviation:.4f} from {count} edges{truth}")
+        spread = f" +- {deviation:.4f} from {count} edges" if count > 1 else " from 1 edge"
+        print(f"{length:.4f}{spread}{truth}")
     convex = found.segments["dihedral"][found.segments["kind"] == rangeedge.EDGE_CONVEX]
     print("angles between faces:", " ".join(f"{angle:.2f}" for angle in convex), "degrees")
 

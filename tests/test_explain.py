@@ -1,5 +1,6 @@
 """Why a pixel is an edge or none: the answer is that of the detector, and what is said to turn it does."""
 
+import re
 import warnings
 
 import cv2
@@ -195,3 +196,18 @@ def test_command(tmp_path, capsys):
     for wrong in ("40", "a,b", "40,30,1"):
         with pytest.raises(SystemExit):
             main([*command[:-1], wrong])
+
+
+def test_command_names_options_as_it_takes_them(tmp_path, capsys):
+    """What it advises, typed as it stands, turns the answer."""
+    cv2.imwrite(str(tmp_path / "depth.png"), depths(0))
+    thin = detectEdges(depths(0), K=K)
+    y, x = np.argwhere(thin)[len(np.argwhere(thin)) // 2]
+    command = ["explain", str(tmp_path / "depth.png"), "-K", "80,80,39.5,29.5", "--at", f"{x},{y}"]
+    for options in ([], ["--line-significance", "1e6"]):
+        assert main([*command, *options]) == 0
+        said = capsys.readouterr().out
+        advice = re.search(r"^  With (.*) it is (none|one)\.$", said, re.MULTILINE)
+        assert not re.search(r"creaseThreshold|jumpThreshold|minLength|lineSignificance", said)
+        assert main([*command, *options, *advice[1].split(", ")]) == 0
+        assert (", no edge." in capsys.readouterr().out) == (advice[2] == "none")

@@ -38,7 +38,7 @@ from .results import (
     write_folder,
 )
 from .texts import EPILOGUES, FIRST_STEPS, INPUT, PURPOSE, USAGES
-from .understood import sentence, told_warnings
+from .understood import in_flags, sentence, told_warnings
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -323,13 +323,6 @@ def _clean(args: argparse.Namespace) -> int:
     return 0
 
 
-def _in_flags(text: str) -> str:
-    """The text with `minLength` and ``eps=0.1`` in the words of the command line; noise and crease are words, too."""
-    unmistakable = "|".join(name for name in DETECTION if name != "K" and not name.islower())
-    text = re.sub(rf"\b(?:{unmistakable})\b|\b(?:{'|'.join(DETECTION)})(?==)", lambda name: _flag(name[0]), text)
-    return re.sub(r"(--[a-z-]+)=(True|False)", lambda switch: ("no " if switch[2] == "False" else "") + switch[1], text)
-
-
 @named("explain")
 def _explain(args: argparse.Namespace) -> int:
     from ..draw import drawExplanation
@@ -339,7 +332,7 @@ def _explain(args: argparse.Namespace) -> int:
     why = explainPixel(image.src, *args.at, **image.geometry)
     if args.out is not None:
         write_atomically(args.out, encoded(".png", drawExplanation(why)))
-    print(_in_flags(str(why)))
+    print(in_flags(str(why), _flag))
     return 0
 
 

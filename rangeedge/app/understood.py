@@ -78,6 +78,15 @@ def _noise(frame: Frame, depth: float | None) -> float | None:
     return None if depth is None else float(frame.noise(abs(depth)))
 
 
+def in_flags(text: str, flag: Callable[[str], str]) -> str:
+    """The text with minLength, `noise`, eps=0.1 in the words of the command line; noise alone is a word of English."""
+    unmistakable = "|".join(name for name in DETECTION if not name.islower())
+    every = "|".join(DETECTION)
+    names = rf"\b({unmistakable})\b|\b({every})(?==)|(?<=`)({every})(?=`)"
+    text = re.sub(names, lambda name: flag(name[0]), text)
+    return re.sub(r"(--[a-z-]+)=(True|False)", lambda word: word[1] if word[2] == "True" else f"no {word[1]}", text)
+
+
 @contextmanager
 def told_warnings(flag: Callable[[str], str]) -> Iterator[None]:
     """Warnings of the package as lines of the command line, in whose words `flag` names the options."""
@@ -88,8 +97,7 @@ def told_warnings(flag: Callable[[str], str]) -> Iterator[None]:
             if not issubclass(category, RangeEdgeWarning):
                 return other(message, category, *where)
             text = str(message).replace("invalid=()", "invalid=none")
-            text = re.sub(rf"\b({'|'.join(DETECTION)})\b", lambda name: flag(name[0]), text)
-            print(f"rangeedge: warning: {text}", file=sys.stderr)
+            print(f"rangeedge: warning: {in_flags(text, flag)}", file=sys.stderr)
 
         warnings.showwarning = tell  # type: ignore[assignment]
         yield
