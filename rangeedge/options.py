@@ -192,6 +192,7 @@ class ScanLineParams(Options):
         "bool",
         "Whether larger values are nearer to the viewer.",
         group="geometry",
+        flagged="the values are heights: larger ones are nearer to the viewer",
     )
     depthFactor: float = option(
         1000.0,
@@ -313,6 +314,8 @@ class ScanLineParams(Options):
         " end: the outline of an object beside its shadow. A surface with a hole in it has none.",
         group="scan lines",
         kernel="shadows",
+        flagged="a surface that ends at a gap wider than --max-gap, in front of another one beyond it, has a jump at"
+        " its end: the outline of an object beside its shadow (default: yes)",
     )
     mergeSignificance: float = option(
         3.5,
@@ -390,6 +393,7 @@ class Selection(Options):
         "bool",
         "Whether to remove lines that do not stand out of the noise, by the statistics of all of them (Venkatesh and"
         " Rosin).",
+        flagged="remove lines that do not stand out of the noise, by the statistics of all of them",
     )
     boundaryEdges: bool = option(
         False,
@@ -397,6 +401,7 @@ class Selection(Options):
         "bool",
         "Whether every border with pixels without data is an edge. Outlines beside shadow are edges without it, where"
         " another surface is seen beyond; see `shadowEdges`.",
+        flagged="every border with pixels without data is an edge; see also --shadow-edges",
     )
 
 
@@ -515,6 +520,7 @@ class Cleaning(Options):
         "bool",
         "Whether to remove flying pixels (`flyingPixels`), which are holes then.",
         group="cleaning",
+        flagged="remove pixels that hang between two surfaces, which are holes then (default: yes)",
     )
 
 

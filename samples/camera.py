@@ -34,7 +34,7 @@ def main(argv=None):
     detector = rangeedge.createScanLineDetector()
     detector.setK(args.K or [525, 525, 319.5, 239.5])
     detector.setNoise(rangeedge.estimateNoise(frames[0], K=detector.getK()))
-    detector.save(args.out / "detector.yml")  # `load` takes it, and so does `rangeedge detect --params`
+    detector.save(args.out / "detector.yml")  # for `detector.load`
     print(detector)
 
     panels = []

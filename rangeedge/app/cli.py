@@ -323,6 +323,13 @@ def _clean(args: argparse.Namespace) -> int:
     return 0
 
 
+def _in_flags(text: str) -> str:
+    """The text with `minLength` and ``eps=0.1`` in the words of the command line; noise and crease are words, too."""
+    unmistakable = "|".join(name for name in DETECTION if name != "K" and not name.islower())
+    text = re.sub(rf"\b(?:{unmistakable})\b|\b(?:{'|'.join(DETECTION)})(?==)", lambda name: _flag(name[0]), text)
+    return re.sub(r"(--[a-z-]+)=(True|False)", lambda switch: ("no " if switch[2] == "False" else "") + switch[1], text)
+
+
 @named("explain")
 def _explain(args: argparse.Namespace) -> int:
     from ..draw import drawExplanation
@@ -332,7 +339,7 @@ def _explain(args: argparse.Namespace) -> int:
     why = explainPixel(image.src, *args.at, **image.geometry)
     if args.out is not None:
         write_atomically(args.out, encoded(".png", drawExplanation(why)))
-    print(why)
+    print(_in_flags(str(why)))
     return 0
 
 

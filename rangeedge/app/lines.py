@@ -17,11 +17,11 @@ from .results import encoded, on_map, plain
 _SCALE_PIXELS = 1200  # at least as wide is the picture
 
 LINE_FILES = {
-    "lines.png": "the straight segments with their lengths, and where they meet",
+    "lines.png": "the straight segments with their lengths: orange jumps, yellow convex, blue concave; corners white",
     "chains.csv": "every point of every chain: pixel, coordinates, jump, crease, significance",
     "chains.ply": "the chains as edges between vertices, with kind and crease",
     "chains.geojson": "the chains as LineStrings",
-    "segments.csv": "both ends of every straight segment: length, dihedral angle, deviations, vertices",
+    "segments.csv": "ends of every straight segment, length, dihedral angle (concave above 180 degrees), deviations",
     "segments.obj": "the segments as polylines",
     "report.json": "the image, the options, and what was found, in numbers",
 }

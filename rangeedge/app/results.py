@@ -43,8 +43,8 @@ _LABELS = 65535  # that 16 bits hold
 
 REGION_FILES = {
     "overview.png": "everything in one picture",
-    "labels.png": "the region of every pixel, 1, 2, ...; 0 is none (16 bits)",
-    "seeds.png": "the seeds that regions grew from, in the same way (16 bits)",
+    "labels.png": "the region of every pixel, 1, 2, ...; 0 is none (16 bits, dark to the eye)",
+    "seeds.png": "the first seeds, in the same way; regions begin too where none of them has reached (16 bits)",
     "surfaces.csv": "of every region: box, area, centroid, normal, quadric, deviation",
     "outlines.svg": "the outlines of the regions over the image",
     "outlines.geojson": "the same as polygons in the coordinates of the surfaces, or of the map",
@@ -56,7 +56,7 @@ EDGE_FILES = {
     "overview.png": "everything in one picture",
     "thin.png": "the edges, one pixel wide: 255, elsewhere 0",
     "edges.png": "the edges before thinning: 255, elsewhere 0",
-    "kind.png": "bits of every pixel: 1 jump, 2 convex, 4 concave, 8 nearer side, 16 farther side, 32 beside no data",
+    "kind.png": "bits, dark to the eye: 1 jump, 2 convex, 4 concave, 8 nearer side, 16 farther side, 32 beside no data",
     "jump.tiff": "jump strength of every candidate, a length (float32)",
     "crease.tiff": "crease strength of every candidate, in degrees (float32)",
     "significance.tiff": "strength over its standard deviation (float32)",
