@@ -26,7 +26,7 @@ def commands():
 
 def test_readme_runs(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert [argv[0] for argv in commands()] == ["demo", "detect", "explain", "segment", "lines", "batch"]
+    assert [argv[0] for argv in commands()] == ["demo", "detect", "explain", "segment", "lines", "clean", "batch"]
     for argv in commands():
         assert main([name for word in argv for name in (glob(word) if "*" in word else [word])]) == 0
         assert Path(argv[-1]).exists()
