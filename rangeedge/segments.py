@@ -246,8 +246,10 @@ def _groups(segments: np.ndarray, reach: float) -> list[list[tuple[int, int]]]:
         for second in order[i + 1 : np.searchsorted(columns, columns[i] + reach, "right")]:
             close = np.hypot(*(pixels[first] - pixels[second])) <= reach
             width = 2 * reach * max(per_pixel[first], per_pixel[second])
-            if close and np.linalg.norm(places[first] - places[second]) <= width and first // 2 != second // 2:
-                group[group == group[second]] = group[first]
+            if close and np.linalg.norm(places[first] - places[second]) <= width:
+                own, other = (np.flatnonzero(group == group[end]) for end in (first, second))
+                if not np.isin(own // 2, other // 2).any():
+                    group[other] = group[first]
     members = [np.flatnonzero(group == g) for g in np.unique(group)]
     return [[ends[k] for k in which] for which in members if len(which) > 1]
 

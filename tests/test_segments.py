@@ -171,3 +171,12 @@ def test_bad_arguments_are_named(call, text):
     with pytest.raises(rangeedge.error) as problem:
         call()
     assert text in str(problem.value)
+
+
+def test_a_short_segment_between_two_others_keeps_its_length():
+    short = line((1, 1, 0), (1.05, 1, 0), count=4)
+    sides = [line((1, 1, 0), (1, 2, 0)), line((1.05, 1, 0), (1.05, 2, 0)), line((1.02, 1, 0), (1.02, 0, 0.5))]
+    segments, vertices = fitSegments([short, *sides], reach=6)
+    assert len(vertices) >= 1
+    assert segments["length"].min() > 0.03
+    assert ((segments["vertices"][:, 0] != segments["vertices"][:, 1]) | (segments["vertices"][:, 0] < 0)).all()
