@@ -112,17 +112,17 @@ def image8(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.nd
 
 
 def image32f(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
-    """A real single-channel image as C-contiguous float32; 8-bit and float64 are converted."""
+    """A real single-channel image as C-contiguous and aligned float32; 8-bit and float64 are converted."""
     expected = "a real array of shape (H, W)" if shape is None else f"a real array of shape {shape}"
     value = array(name, value, expected)
     if shape is not None and value.shape != shape:
         raise fail(name, expected, described(value), cv2.Error.StsUnmatchedSizes)
     with np.errstate(over="ignore"):
-        return np.ascontiguousarray(value, dtype=np.float32)
+        return np.require(value, np.float32, "CA")
 
 
 def labels32s(name: str, value: Any, shape: tuple[int, int] | None = None, *, listed: bool = False) -> np.ndarray:
-    """A label image as C-contiguous int32; with `listed`, there is room for a table with a row for each label."""
+    """A label image as C-contiguous and aligned int32; with `listed`, there is room for a table with a row for each label."""
     expected = "an int32 array of shape (H, W)" if shape is None else f"an int32 array of shape {shape}"
     value = array(name, value, expected)
     if value.dtype != np.int32:
@@ -134,7 +134,7 @@ def labels32s(name: str, value: Any, shape: tuple[int, int] | None = None, *, li
         raise fail(
             name, f"{expected}, labels of up to {most}", f"labels of up to {value.max()}", cv2.Error.StsOutOfRange
         )
-    return np.ascontiguousarray(value)
+    return np.require(value, requirements="CA")
 
 
 def number(name: str, value: Any, low: float = -np.inf, high: float = np.inf, *, above: bool = False) -> float:

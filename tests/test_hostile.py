@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import rangeedge
+from rangeedge import _check
 from rangeedge.batch import detectBatch
 
 ROOT = Path(rangeedge.__file__).parents[1]
@@ -215,3 +216,12 @@ def test_a_destination_of_another_type_is_left_alone(dtype):
     assert found is not dst
     assert found.dtype == np.float32
     assert (dst == 7).all()
+
+
+@pytest.mark.parametrize("check, dtype", [(_check.labels32s, np.int32), (_check.image32f, np.float32)])
+def test_kernels_get_aligned_arrays(check, dtype):
+    values = np.arange(12, dtype=dtype).reshape(3, 4)
+    assert not unaligned(values).flags.aligned
+    given = check("values", unaligned(values))
+    assert given.flags.aligned
+    assert np.array_equal(given, values)
