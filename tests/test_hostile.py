@@ -218,7 +218,7 @@ def test_a_destination_of_another_type_is_left_alone(dtype):
     assert (dst == 7).all()
 
 
-@pytest.mark.parametrize("check, dtype", [(_check.labels32s, np.int32), (_check.image32f, np.float32)])
+@pytest.mark.parametrize(("check", "dtype"), [(_check.labels32s, np.int32), (_check.image32f, np.float32)])
 def test_kernels_get_aligned_arrays(check, dtype):
     values = np.arange(12, dtype=dtype).reshape(3, 4)
     assert not unaligned(values).flags.aligned
