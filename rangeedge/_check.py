@@ -112,7 +112,7 @@ def image8(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.nd
 
 
 def image32f(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
-    """A real single-channel image as C-contiguous and aligned float32; 8-bit and float64 are converted."""
+    """A real single-channel image as C-contiguous, aligned float32; 8-bit and float64 are converted."""
     expected = "a real array of shape (H, W)" if shape is None else f"a real array of shape {shape}"
     value = array(name, value, expected)
     if shape is not None and value.shape != shape:
@@ -122,7 +122,7 @@ def image32f(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.
 
 
 def labels32s(name: str, value: Any, shape: tuple[int, int] | None = None, *, listed: bool = False) -> np.ndarray:
-    """A label image as C-contiguous and aligned int32; with `listed`, there is room for a table with a row for each label."""
+    """A label image as C-contiguous, aligned int32; with `listed`, there is room for a table with a row a label."""
     expected = "an int32 array of shape (H, W)" if shape is None else f"an int32 array of shape {shape}"
     value = array(name, value, expected)
     if value.dtype != np.int32:
