@@ -7,7 +7,6 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import cv2
 import numpy as np
 
 from ._check import error
@@ -83,7 +82,8 @@ def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
     coarse = src[::4, ::4][frame.valid[::4, ::4] > 0]
     if src.size < _LEAST_IMAGE or not len(coarse):
         return
-    for value in _extremes(src, frame.valid):
+    values = src[frame.valid > 0]
+    for value in (values.max(), values.min()):
         others = coarse[coarse != value].astype(np.float64)
         if not len(others):
             continue
@@ -97,15 +97,6 @@ def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
                 f"`src` is {value:g} at {count} of {src.size} pixels, far from all others: say invalid={value:g} if"
                 " these have no data, invalid=() if they have"
             )
-
-
-def _extremes(src: np.ndarray, valid: np.ndarray) -> tuple[float, float]:
-    """The largest and the least value of valid pixels, of which there are some."""
-    if src.dtype in (np.uint16, np.int16, np.int32, np.float32, np.float64):
-        least, largest = cv2.minMaxLoc(np.ascontiguousarray(src), valid)[:2]
-        return largest, least
-    values = src[valid > 0]
-    return values.max(), values.min()
 
 
 def _warn_of_camera(K: np.ndarray, shape: tuple[int, ...]) -> None:

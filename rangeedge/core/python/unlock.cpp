@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <thread>
 #include <vector>
 
 namespace rangeedge::python {
@@ -25,8 +27,26 @@ std::vector<const Cancellation*>& entered() {
     return all;
 }
 
-// Once Python ends, its lock is no longer to be had by threads that still work.
+// Once Python ends, a thread that asks for its lock is ended in the middle of what it does, which C++ does not survive.
+// So threads that are still at work wait for the end of the process then, but for the one that ends Python, which waits
+// for those that have asked before.
 std::atomic<bool> python_ends{false};
+std::atomic<int> asking{0};
+std::thread::id ending;
+
+void ask_for_lock() {
+    ++asking;
+    if (!python_ends || std::this_thread::get_id() == ending) return;
+    --asking;
+    while (true) std::this_thread::sleep_for(std::chrono::hours(1));
+}
+
+void end_python() {
+    ending = std::this_thread::get_id();
+    python_ends = true;
+    const nb::gil_scoped_release released;
+    while (asking > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+}
 
 void ask_cancellations() {
     for (const Cancellation* c : entered())
@@ -35,8 +55,9 @@ void ask_cancellations() {
 
 void ask() {
     ask_cancellations();
-    if (python_ends) return;
+    ask_for_lock();
     const nb::gil_scoped_acquire locked;
+    --asking;
     if (PyErr_CheckSignals() != 0) throw nb::python_error();
 }
 
@@ -52,6 +73,13 @@ void leave(const Cancellation& self, const nb::args&) {
 }
 
 }  // namespace
+
+Released::Released() : state_(PyEval_SaveThread()) {}
+Released::~Released() {
+    ask_for_lock();
+    PyEval_RestoreThread(state_);
+    --asking;
+}
 
 Unlock::Unlock() : watch_(ask) { ask_cancellations(); }
 
@@ -71,7 +99,7 @@ void bind_cancellation(nb::module_& m) {
         }
     });
     nb::set_leak_warnings(false);  // of what threads hold that are still at work then
-    nb::module_::import_("atexit").attr("register")(nb::cpp_function([] { python_ends = true; }));
+    nb::module_::import_("atexit").attr("register")(nb::cpp_function(&end_python));
 }
 
 }  // namespace rangeedge::python

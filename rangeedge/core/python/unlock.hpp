@@ -7,12 +7,24 @@
 
 namespace rangeedge::python {
 
+// Python's lock, given back while this lasts.
+class Released {
+public:
+    Released();
+    ~Released();
+    Released(const Released&) = delete;
+    Released& operator=(const Released&) = delete;
+
+private:
+    PyThreadState* state_;
+};
+
 class Unlock {
 public:
     Unlock();
 
 private:
-    nanobind::gil_scoped_release release_;
+    Released released_;
     Watch watch_;
 };
 using Unlocked = nanobind::call_guard<Unlock>;
