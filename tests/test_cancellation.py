@@ -60,6 +60,7 @@ def calls():
         "segmentRegionsWithStats": lambda: rangeedge.segmentRegionsWithStats(z, noise=1e-4),
         "growRegions": lambda: rangeedge.growRegions(np.tile(z, (2, 2)), np.tile(markers, (2, 2)), noise=1e-4),
         "regionAdjacency": lambda: rangeedge.regionAdjacency(z, labels),
+        "regionBoundaries": lambda: rangeedge.regionBoundaries((4 * z).astype(np.int32)),
         "closeContours": lambda: rangeedge.closeContours((z > 1.1).astype(np.uint8), z),
         "thinEdges": lambda: rangeedge.thinEdges(full),
         "distanceTransform": lambda: rangeedge.distanceTransform(edges, barrier=walls),
@@ -212,3 +213,44 @@ time.sleep({wait})
 """
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
     assert (run.returncode, run.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("call", ["edgeStrength(z, noise=0.1)", "regionBoundaries(labels)"])
+def test_python_may_end_while_one_kernel_follows_the_other(call):
+    program = f"""
+import sys; sys.path.insert(0, {str(ROOT)!r})
+import numpy as np, rangeedge, threading, time
+z = np.random.default_rng(0).normal(1, .1, (300, 300))
+labels = (4 * z).astype(np.int32)
+def work():
+    while True:
+        rangeedge.{call}
+for _ in range(4):
+    threading.Thread(target=work, daemon=True).start()
+time.sleep(0.3)
+"""
+    for _ in range(3):
+        run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False, timeout=60)
+        assert (run.returncode, run.stderr) == (0, "")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
+def test_a_fork_ends_though_other_threads_were_waiting_for_the_lock():
+    program = f"""
+import sys; sys.path.insert(0, {str(ROOT)!r})
+import numpy as np, os, rangeedge, signal, threading, time
+z = np.random.default_rng(0).normal(1, .1, (60, 80))
+def work():
+    while True:
+        rangeedge.edgeStrength(z, noise=0.1)
+for _ in range(4):
+    threading.Thread(target=work, daemon=True).start()
+time.sleep(0.3)
+for _ in range(20):
+    child = os.fork()
+    if not child:
+        signal.alarm(10)
+        sys.exit()
+    assert os.waitpid(child, 0)[1] == 0
+"""
+    subprocess.run([sys.executable, "-W", "ignore", "-c", program], check=True, timeout=60)

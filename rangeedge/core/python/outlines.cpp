@@ -20,7 +20,7 @@ using Numbers = nb::ndarray<nb::numpy, std::int32_t, nb::ndim<1>>;
 std::tuple<Rows, Rows, Numbers, Rows, Numbers> bound_trace_outlines(const Image<std::int32_t>& labels) {
     Outlines found;
     {
-        nb::gil_scoped_release release;
+        const Unlock unlock;
         found = trace_outlines(labels.data(), rows(labels), cols(labels));
     }
     std::vector<std::array<std::int32_t, 3>> rings;  // the area is known from the corners

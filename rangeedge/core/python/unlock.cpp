@@ -11,6 +11,7 @@ namespace rangeedge::python {
 namespace {
 
 namespace nb = nanobind;
+using namespace nb::literals;
 
 struct Cancelled : std::exception {
     const char* what() const noexcept override { return "cancelled"; }
@@ -47,6 +48,9 @@ void end_python() {
     const nb::gil_scoped_release released;
     while (asking > 0) std::this_thread::sleep_for(std::chrono::milliseconds(1));
 }
+
+// The child of a fork has one thread, which holds the lock; those that were asking for it are not there.
+void forget_others() { asking = 0; }
 
 void ask_cancellations() {
     for (const Cancellation* c : entered())
@@ -100,6 +104,9 @@ void bind_cancellation(nb::module_& m) {
     });
     nb::set_leak_warnings(false);  // of what threads hold that are still at work then
     nb::module_::import_("atexit").attr("register")(nb::cpp_function(&end_python));
+    const nb::module_ os = nb::module_::import_("os");
+    if (nb::hasattr(os, "register_at_fork"))
+        os.attr("register_at_fork")("after_in_child"_a = nb::cpp_function(&forget_others));
 }
 
 }  // namespace rangeedge::python

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/array.hpp"
+#include "base/watch.hpp"
 
 namespace rangeedge {
 namespace {
@@ -24,12 +25,14 @@ public:
         for (int row = 0; row < rows; ++row)
             std::copy_n(labels + static_cast<std::ptrdiff_t>(row) * cols, cols, &label[(row + 1) * stride_ + 1]);
         std::vector<int> open;
+        Checkpoints checkpoints;
         for (int p = stride_; p < label.count() - stride_; ++p) {
             if (region_[p] || label[p] <= 0) continue;
             const auto region = static_cast<std::int32_t>(names.size());
             region_[p] = region;
             open.push_back(p);
             while (!open.empty()) {
+                checkpoints.pass();
                 const int q = open.back();
                 open.pop_back();
                 for (const int step : {1, -1, stride_, -stride_})
@@ -73,8 +76,10 @@ public:
 private:
     template <class F>
     void for_corners(F&& visit) const {
-        for (int y = 0; y <= rows_; ++y)
+        for (int y = 0; y <= rows_; ++y) {
+            Watch::checkpoint();
             for (int x = 0; x <= cols_; ++x) visit(x, y);
+        }
     }
     bool inside(int x, int y) const { return x >= 0 && y >= 0 && x <= cols_ && y <= rows_; }
     bool open(int x, int y, int way) const {
@@ -115,14 +120,20 @@ private:
 
     // Rings: an arc is followed by the one that goes round the same pixel, on its right, or straight on, or left.
     void link() {
-        std::sort(starts_.begin(), starts_.end(), [](const Start& a, const Start& b) { return a.key() < b.key(); });
+        Checkpoints comparisons;
+        std::sort(starts_.begin(), starts_.end(), [&](const Start& a, const Start& b) {
+            comparisons.pass();
+            return a.key() < b.key();
+        });
         const auto arcs = static_cast<Array<char>::Index>(found_.arcs.size());
         Array<char> used(2 * arcs, 0);
         const auto place = [&](std::int32_t step) { return step >= 0 ? step : arcs - step - 1; };
         // The end of a step, and the way on which it comes there: back along the start of its reverse.
         Array<Start> reverse(2 * arcs, Start{});
         for (const Start& s : starts_) reverse[place(-s.step - 1)] = s;
+        Checkpoints checkpoints(256);
         for (const Start& start : starts_) {
+            checkpoints.pass();
             const std::int32_t region = on_right(start.step);
             if (region == 0 || used[place(start.step)]) continue;
             Outlines::Ring ring{static_cast<std::int32_t>(found_.steps.size()), 0, region, 0};
@@ -198,7 +209,9 @@ Outlines trace_outlines(const std::int32_t* labels, int rows, int cols) { return
 
 void simplify_lines(const double* points, const std::vector<Polyline>& lines, std::uint8_t* kept) {
     std::vector<std::pair<std::int64_t, std::int64_t>> open;
+    Checkpoints checkpoints;
     for (const Polyline& line : lines) {
+        checkpoints.pass();
         const std::int64_t end = line.first + line.count - 1;
         const double *const first = points + 2 * line.first, *const last = points + 2 * end;
         kept[line.first] = kept[end] = 1;
@@ -207,6 +220,7 @@ void simplify_lines(const double* points, const std::vector<Polyline>& lines, st
         while (!open.empty()) {
             const auto [a, b] = open.back();
             open.pop_back();
+            checkpoints.pass();
             double most = 0;
             std::int64_t worst = a;
             for (std::int64_t k = a + 1; k < b; ++k) {
