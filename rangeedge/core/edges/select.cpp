@@ -32,23 +32,28 @@ struct EdgeMap {
 // The length of a line: the longer side of its bounding box, or the number of its columns where the map wraps.
 class Extent {
 public:
-    explicit Extent(const EdgeMap& map)
-        : wrap_(map.wrap), left_(map.cols), top_(map.rows), seen_(wrap_ ? static_cast<std::size_t>(map.cols) : 0, 0) {}
+    explicit Extent(const EdgeMap& map) : map_(map), line_(map.wrap ? static_cast<std::size_t>(map.cols) : 0, 0) {}
 
+    // Of another line from now on, which costs the same however wide the map is.
+    void start() {
+        ++number_, columns_ = 0;
+        left_ = map_.cols, right_ = -1, top_ = map_.rows, bottom_ = -1;
+    }
     void add(int row, int first, int last) {
         left_ = std::min(left_, first), right_ = std::max(right_, last);
         top_ = std::min(top_, row), bottom_ = std::max(bottom_, row);
-        if (wrap_) std::fill(seen_.begin() + first, seen_.begin() + last + 1, std::uint8_t{1});
+        for (int col = first; map_.wrap && col <= last; ++col) {
+            int& latest = line_[static_cast<std::size_t>(col)];
+            columns_ += latest != number_;
+            latest = number_;
+        }
     }
-    int length() const {
-        const int wide = wrap_ ? static_cast<int>(std::count(seen_.begin(), seen_.end(), 1)) : right_ - left_ + 1;
-        return std::max(wide, bottom_ - top_ + 1);
-    }
+    int length() const { return std::max(map_.wrap ? columns_ : right_ - left_ + 1, bottom_ - top_ + 1); }
 
 private:
-    bool wrap_;
-    int left_, right_ = -1, top_, bottom_ = -1;
-    std::vector<std::uint8_t> seen_;
+    const EdgeMap& map_;
+    int number_ = 0, columns_ = 0, left_ = 0, right_ = -1, top_ = 0, bottom_ = -1;
+    std::vector<int> line_;  // number of the latest one in every column
 };
 
 // Each pixel with the eight around it.
@@ -72,9 +77,10 @@ EdgeMap widened(const EdgeMap& edges) {
 void drop_faint(EdgeMap& edges, const float* significance, double least) {
     const Components lines = widened(edges).components();
     Checkpoints checkpoints;
+    Extent extent(edges);
     for (int i = 0; i < lines.count(); ++i) {
         checkpoints.pass();
-        Extent extent(edges);
+        extent.start();
         double squares = 0, pixels = 0;
         const auto for_each_pixel = [&](auto&& visit) {
             for (const auto [begin, end] : lines.runs(i)) {
@@ -107,9 +113,10 @@ void keep_lines(const std::uint8_t* edges, int rows, int cols, bool wrap, int mi
     std::fill_n(kept, rows * width, std::uint8_t{0});
     const Components pieces = map.components();
     Checkpoints checkpoints;
+    Extent extent(map);
     for (int i = 0; i < pieces.count(); ++i) {
         checkpoints.pass();
-        Extent extent(map);
+        extent.start();
         for (const auto [begin, end] : pieces.runs(i))
             extent.add(pieces.row_of(begin), pieces.col_of(begin), pieces.col_of(end - 1));
         if (extent.length() < min_length) continue;
