@@ -175,7 +175,7 @@ def regionBoundaries(
     frame = None
     if src is not None:
         frame = read_frame(src, params, mask)
-        labels = labels32s("labels", labels, frame.shape)
+        labels = labels32s("labels", labels, frame.shape, listed=True)
     return boundaries_of(labels, frame, tolerance, units)
 
 

@@ -104,7 +104,7 @@ def cleanDepth(
     params, cleaning = parsed(options, ScanLineParams, Cleaning)
     frame = measured_frame(src, params, mask)
     values = range_array(src)[0]
-    given = None if labels is None else labels32s("labels", labels, frame.shape)
+    given = None if labels is None else labels32s("labels", labels, frame.shape, listed=True)
     inside = None if mask is None else image8("mask", mask, frame.shape)
     return _cleaned(values, frame, params, cleaning, given, inside)
 

@@ -242,6 +242,7 @@ def test_pictures_show_borders_and_colours():
     [
         (lambda: regionBoundaries(np.ones((3, 4))), "regionBoundaries: `labels` must be an int32 array"),
         (lambda: regionBoundaries(np.ones((3, 4), np.int32), np.ones((3, 5))), "`labels` must be an int32 array of"),
+        (lambda: regionBoundaries(np.full((3, 4), 10**9, np.int32), np.ones((3, 4))), "labels of up to 65535"),
         (lambda: regionBoundaries(np.ones((3, 4), np.int32), tolerance=-1), "`tolerance` must be a finite number >= 0"),
         (lambda: regionBoundaries(np.ones((3, 4), np.int32), units=1), "`units` must be True or False"),
         (lambda: drawBoundaries(np.ones((3, 4)), 3), "drawBoundaries: `boundaries` must be RegionBoundaries"),

@@ -234,6 +234,7 @@ def test_nothing_is_left_as_it_is():
         (lambda: cleanDepth(3), "cleanDepth: `src` must be"),
         (lambda: cleanDepth(np.ones((3, 4)), np.ones((3, 4))), "cleanDepth: `labels` must be an int32 array"),
         (lambda: cleanDepth(np.ones((3, 4)), np.ones((4, 4), np.int32)), "`labels` must be an int32 array of shape"),
+        (lambda: cleanDepth(np.ones((3, 4)), np.full((3, 4), 10**8, np.int32)), "labels of up to 65535"),
         (lambda: cleanDepth(np.ones((3, 4)), maxHole=-1), "`maxHole` must be an integer >= 0"),
         (lambda: cleanDepth(np.ones((3, 4)), radius=-1), "`radius` must be a finite number >= 0"),
         (lambda: cleanDepth(np.ones((3, 4)), removeFlying=1), "`removeFlying` must be True or False"),
