@@ -41,8 +41,6 @@ def extractSeeds(
         Where it is zero there are no seeds, nor ways between them.
     wrap : bool
         Whether the first column follows the last, as in a scan all around.
-    wrap : bool
-        Whether the first column follows the last, as in a scan all around.
     {options}
 
     Returns

@@ -185,8 +185,6 @@ def selectEdges(*args: Any, **options: Any) -> np.ndarray:
         strengths found with ``minSignificance=0`` and low thresholds.
     wrap : bool
         Whether the first column follows the last, as in a scan all around.
-    wrap : bool
-        Whether the first column follows the last, as in a scan all around.
     dst : ndarray of shape (H, W), CV_8U, optional
         Receives the result where shape and type fit.
 

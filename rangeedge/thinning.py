@@ -51,8 +51,6 @@ def thinEdges(
         counted; 0 keeps all. A line with two free ends is no branch, however short.
     wrap : bool
         Whether the first column follows the last, as in a scan all around.
-    wrap : bool
-        Whether the first column follows the last, as in a scan all around.
 
     Returns
     -------

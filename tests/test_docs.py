@@ -1,5 +1,6 @@
 """Every program and every command in the documentation runs as it stands, in the order of its page."""
 
+import inspect
 import json
 import re
 import shlex
@@ -61,3 +62,11 @@ def test_options_in_tables_exist():
     known |= set(DETECTION)
     for name in re.findall(r"`(\w+)(?:=[^`]*)?`", (DOCS / "parameters.md").read_text("utf-8")):
         assert name in known or name.isdigit(), name
+
+
+@pytest.mark.parametrize("name", [name for name in rangeedge.__all__ if name[0].islower() and name != "error"])
+def test_no_parameter_is_described_twice(name):
+    text = inspect.getdoc(getattr(rangeedge, name)) or ""
+    section = re.search(r"^Parameters\n-+\n(.*?)(?=^\w[\w ]*\n-{3,}$|\Z)", text, re.MULTILINE | re.DOTALL)
+    described = re.findall(r"^(\w+)(?:, \w+)* : ", section[1], re.MULTILINE) if section else []
+    assert len(described) == len(set(described))
