@@ -152,6 +152,8 @@ void EvenSegments::update_costs(const Array<int>& cuts) {
         part(2 * numbers)[k] = sigma[cuts[k]];
         part(2 * numbers + 1)[k] = waves[cuts[k]];
     }
+    // What fills up the last lanes has no samples: left from before, it could be beyond any number of them.
+    for (std::ptrdiff_t k = cuts.size(); k < count; ++k) part(0)[k] = part(numbers)[k] = 0;
     const auto side = [&](int i) {
         return Columns{part(i), part(i + 1), part(i + 2), part(i + 3), part(i + 4), part(i + 5)};
     };
