@@ -233,7 +233,7 @@ def _lengths(src: np.ndarray, depthFactor: float, heightMap: bool = False) -> np
     Depths of 0 or less are invalid. Heights may be negative: among signed ones only the least of the type is invalid.
     """
     if src.dtype.kind == "f":
-        return np.ascontiguousarray(src, dtype=np.float64 if src.dtype.itemsize > 4 else np.float32)
+        return np.require(src, np.float64 if src.dtype.itemsize > 4 else np.float32, ["C", "A"])
     real = np.float32 if src.dtype.itemsize <= 2 else np.float64
     lengths = np.divide(src, real(depthFactor), dtype=real, order="C")
     lengths[src <= (np.iinfo(src.dtype).min if heightMap else 0)] = np.nan
@@ -248,7 +248,7 @@ def _step(src: np.ndarray, depthFactor: float) -> float:
 def _pinhole(src: np.ndarray, seen: np.ndarray | None, params: ScanLineParams) -> Frame:
     # The kernel divides by the factor what depth cameras give; other integers are divided here.
     factor, K = params.depthFactor, params.K
-    depth = np.ascontiguousarray(src) if src.dtype == np.uint16 else _lengths(src, factor)
+    depth = np.require(src, np.uint16, ["C", "A"]) if src.dtype == np.uint16 else _lengths(src, factor)
     inverse = np.empty(depth.shape, np.float32 if depth.dtype == np.uint16 else depth.dtype)
     _core.invert_depth(depth, factor, None if seen is None else seen.view(np.uint8), inverse)
     if params.distCoeffs is None or not params.distCoeffs.any():

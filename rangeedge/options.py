@@ -66,7 +66,7 @@ def _noise(name: str, value: Any) -> NoiseModel | float | np.ndarray:
     value = _check.array(name, value, expected)
     if value.dtype.kind == "b":
         raise _check.fail(name, expected, _check.described(value))
-    return _read_only(value.astype(np.float32))
+    return _read_only(value.astype(np.float32, order="C"))
 
 
 def _read_only(values: np.ndarray) -> np.ndarray:

@@ -12,8 +12,10 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge import _check
+from rangeedge import _check, _core
 from rangeedge.batch import detectBatch
+from rangeedge.frame import read_frame
+from rangeedge.options import ScanLineParams
 
 ROOT = Path(rangeedge.__file__).parents[1]
 HUGE = 10**400  # beyond double precision
@@ -225,3 +227,23 @@ def test_kernels_get_aligned_arrays(check, dtype):
     given = check("values", unaligned(values))
     assert given.flags.aligned
     assert np.array_equal(given, values)
+
+
+@pytest.mark.parametrize("dtype", [np.uint16, np.int32, np.float16, np.float32, np.float64])
+@pytest.mark.parametrize("options", [{}, {"heightMap": True}, {"K": (100, 100, 30, 20)}])
+def test_kernels_get_aligned_frames(monkeypatch, options, dtype):
+    given = []
+    invert = _core.invert_depth
+    monkeypatch.setattr(_core, "invert_depth", lambda depth, *rest: (given.append(depth), invert(depth, *rest)))
+    frame = read_frame(unaligned(DEPTH.astype(dtype)), ScanLineParams(**options))
+    assert len(given) == ("K" in options)
+    assert all(image.flags.aligned for image in [frame.samples, *given])
+
+
+@pytest.mark.parametrize("dtype", [np.float16, np.float32, np.float64])
+def test_a_map_of_noise_may_lie_in_memory_as_it_likes(dtype):
+    noise = (0.01 + 0.001 * np.arange(DEPTH.size).reshape(DEPTH.shape)).astype(dtype)
+    expected = rangeedge.edgeStrength(DEPTH, noise=noise)
+    for other in (np.asfortranarray(noise), np.repeat(noise, 2, axis=1)[:, ::2], unaligned(noise)):
+        for one, same in zip(rangeedge.edgeStrength(DEPTH, noise=other), expected, strict=True):
+            assert np.array_equal(one, same)
