@@ -118,7 +118,7 @@ def image32f(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.
     if shape is not None and value.shape != shape:
         raise fail(name, expected, described(value), cv2.Error.StsUnmatchedSizes)
     with np.errstate(over="ignore"):
-        return np.require(value, np.float32, "CA")
+        return np.require(value, np.float32, ["C", "A"])
 
 
 def labels32s(name: str, value: Any, shape: tuple[int, int] | None = None, *, listed: bool = False) -> np.ndarray:
@@ -134,7 +134,7 @@ def labels32s(name: str, value: Any, shape: tuple[int, int] | None = None, *, li
         raise fail(
             name, f"{expected}, labels of up to {most}", f"labels of up to {value.max()}", cv2.Error.StsOutOfRange
         )
-    return np.require(value, requirements="CA")
+    return np.require(value, requirements=["C", "A"])
 
 
 def number(name: str, value: Any, low: float = -np.inf, high: float = np.inf, *, above: bool = False) -> float:

@@ -123,8 +123,9 @@ private:
 };
 
 // Runs body(begin, end, thread) on contiguous chunks that cover [0, count), and returns when all are done. Those of one
-// thread follow each other, with a checkpoint before each. `thread` counts from 0, so that each may own a buffer. Chunks
-// depend on the team, results must not: let body(begin, end, .) do for each index what body(index, index + 1, .) would.
+// thread follow each other, with a checkpoint before each. `thread` counts from 0, so that each may own a buffer.
+// Chunks depend on the team, results must not: let body(begin, end, .) do for each index what body(index, index + 1, .)
+// would.
 template <class F>
 void parallel_for(int count, Team& team, F&& body) {
     constexpr int chunks = 16;  // of a thread

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "chains/samples.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "chains/line_sums.hpp"

@@ -4,12 +4,6 @@
 #include <algorithm>
 
 namespace rangeedge {
-namespace {
-
-constexpr double curved_gain = 0.8;  // a quadratic must lower the rms of a plane to this share
-constexpr int least_curved = 40;     // pixels; fewer tell no curvature
-
-}  // namespace
 
 std::vector<Surface> fit_surfaces(const OrdinateMap& map, const std::int32_t* labels, int count) {
     std::vector<SurfaceSums> sums(static_cast<std::size_t>(count));

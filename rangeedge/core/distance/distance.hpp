@@ -1,6 +1,6 @@
 // Distance and salience distance transforms. Images are dense rows of pixels. Every transform writes `distance`, and
-// `labels` unless it is null: the index row * cols + col of the source that each distance is measured to, the lowest one
-// where several are nearest. Without any source distances are +infinity and labels -1.
+// `labels` unless it is null: the index row * cols + col of the source that each distance is measured to, the lowest
+// one where several are nearest. Without any source distances are +infinity and labels -1.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 

@@ -3,14 +3,14 @@
 //
 // The two axes are treated one after the other (Felzenszwalb and Huttenlocher). Within a column, the source that is
 // nearest to a pixel of that column is found first; whatever column p itself is in, no other source of this column can
-// be nearer to p's row. So a row of D^2 is the lower envelope of one parabola per column, (x - column)^2 + height, where
-// height is what the column's source contributes along the column. Any two parabolas of one width change places once,
-// hence an envelope is built from left to right with a stack, in time proportional to the number of columns.
+// be nearer to p's row. So a row of D^2 is the lower envelope of one parabola per column, (x - column)^2 + height,
+// where height is what the column's source contributes along the column. Any two parabolas of one width change places
+// once, hence an envelope is built from left to right with a stack, in time proportional to the number of columns.
 //
 // Where distances are short, looking at every column within reach is quicker than an envelope: window.hpp.
 //
-// Pixels may be taller than wide: lengths are in pixel widths, and squares along columns count `aspect` times. Where the
-// image wraps around, half a row of parabolas is repeated on either side.
+// Pixels may be taller than wide: lengths are in pixel widths, and squares along columns count `aspect` times. Where
+// the image wraps around, half a row of parabolas is repeated on either side.
 //
 // P. Felzenszwalb and D. Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012.
 // SPDX-License-Identifier: Apache-2.0

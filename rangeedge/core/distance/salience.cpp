@@ -3,15 +3,16 @@
 // No axis can be treated before the other here, as what a source contributes depends on how far away it is. So this is
 // branch and bound, over a quadtree of tiles (of pixels) and one of blocks (of sources), with w = 1 / s^2:
 //
-// 1. For a tile and a block, w_min (least distance)^2 is a lower bound of D^2, and w (largest distance)^2 of the block's
-//    strongest source an upper one: a block whose lower bound exceeds the least upper bound has no say in the tile.
+// 1. For a tile and a block, w_min (least distance)^2 is a lower bound of D^2, and w (largest distance)^2 of the
+//    block's strongest source an upper one: a block whose lower bound exceeds the least upper bound has no say in the
+//    tile.
 // 2. Tiles are split into four, and the blocks left into theirs, down to tiles of 8 x 8 pixels.
 // 3. Where salience rises steadily over a wide area, a source that is farther away makes up for it by being stronger,
 //    and the bounds of step 1 exclude little. Then blocks are compared with the source of the least upper bound, the
 //    pivot: both distances are replaced by planes over the tile, the saliences of a block by the plane above them,
 //    and of the difference only what the planes leave is lost.
-// 4. In a tile of pixels a source goes that exceeds the pivot everywhere on the tile, and those left, about a dozen, are
-//    compared pixel by pixel.
+// 4. In a tile of pixels a source goes that exceeds the pivot everywhere on the tile, and those left, about a dozen,
+//    are compared pixel by pixel.
 //
 // All this is done in float. `slack` allows for its rounding in the bounds; where the two best sources of a pixel come
 // too close to tell, the choice is made in double, and exactly where pixels are square.

@@ -145,8 +145,8 @@ struct Blocks : Points {
     }
 };
 
-// The sources of a map in blocks of tile_size << level pixels, four parts each. Where the image wraps around, half of it
-// is repeated on either side.
+// The sources of a map in blocks of tile_size << level pixels, four parts each. Where the image wraps around, half of
+// it is repeated on either side.
 template <class T>
 class SourceTree {
 public:

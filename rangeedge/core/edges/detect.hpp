@@ -18,8 +18,8 @@
 namespace rangeedge {
 
 // All candidates, by their place in the image; the same for any number of threads. `smeared`, unless null, becomes 255
-// at pixels over which a step is smeared (smear.hpp); it holds zeros before. `weak`, unless null, receives the candidates
-// that were dropped because they and their neighbours are not significant.
+// at pixels over which a step is smeared (smear.hpp); it holds zeros before. `weak`, unless null, receives the
+// candidates that were dropped because they and their neighbours are not significant.
 template <class T>
 std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, int threads,
                                        std::uint8_t* smeared = nullptr, std::vector<Candidate>* weak = nullptr);

@@ -3,11 +3,11 @@
 // 1. Peeling. Round by round the border pixels go that are simple: to remove one of them neither splits nor deletes
 //    anything, nor does it open or join holes. All go at once, so that no side is first. Where pixels are simple one by
 //    one but not together, all of them stay: these are the crucial cliques of Bertrand and Couprie's critical kernels,
-//    in the plane a pair of 4-neighbours or what is set of a square of four. What a round leaves of the border is a line
-//    by now and stays for good, as do pixels with a single neighbour, the ends of lines. So every pixel is looked at in
-//    one round alone, and the time is proportional to their number.
-// 2. Narrowing. The lines may still be two or three pixels wide, since the cliques stayed whole. Pixels at the fringe of
-//    the band go before inner ones; among equals a side has to be chosen: first south, then north, east, west.
+//    in the plane a pair of 4-neighbours or what is set of a square of four. What a round leaves of the border is a
+//    line by now and stays for good, as do pixels with a single neighbour, the ends of lines. So every pixel is looked
+//    at in one round alone, and the time is proportional to their number.
+// 2. Narrowing. The lines may still be two or three pixels wide, since the cliques stayed whole. Pixels at the fringe
+//    of the band go before inner ones; among equals a side has to be chosen: first south, then north, east, west.
 // 3. Pruning. Branches with a free end that hardly stand out of the band go, the shortest first. What is left when the
 //    last junction has gone is a line with two ends and no branch.
 // 4. Drawing ends. Peeling takes as much off the end of a band as off its sides, or runs into one of its corners. Lines
@@ -73,8 +73,8 @@ constexpr bool lies_beside_line(Ring on, int from) {
     return (ahead & 1) && (ahead & 0x06) && (ahead & 0xc0);
 }
 
-// Whether a candidate belongs to a clique of which a pixel must stay. `on` are the neighbours that are set, `candidates`
-// those of them that would go with it.
+// Whether a candidate belongs to a clique of which a pixel must stay. `on` are the neighbours that are set,
+// `candidates` those of them that would go with it.
 constexpr bool is_crucial(Ring on, Ring candidates) {
     // A pair of 4-neighbours: what touches their common side must do so at one of its two ends.
     const Ring left = turned(on, 1) | turned(on, 2), right = turned(on, 7) | turned(on, 6);

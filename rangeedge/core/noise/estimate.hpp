@@ -11,7 +11,8 @@ struct NoiseEstimate {
     FitNoiseEstimate fits;
 };
 
-// Of ordinates, NaN without data, which were rounded to multiples of `step` as lengths (0: to those of the step they show).
+// Of ordinates, NaN without data, which were rounded to multiples of `step` as lengths (0: to those of the step they
+// show).
 template <class T>
 NoiseEstimate estimate_noise(const T* ordinate, int rows, int cols, bool projective, double step, int threads);
 

@@ -11,10 +11,10 @@
 //     sd D = sigma_n sqrt(6 / m2),   sd G = sigma_n sqrt(6 / n + n^2 / (2 m2)),   m2 = n (n^2 - 1) / 12.
 //
 // What their medians exceed that by are the factors of n: edges are few enough not to move these. Means of D and G over
-// five neighbouring scan lines, times sqrt(5), tell the shared factors, which are the same for noise that is independent
-// from line to line. |D| for n = 16, by depth, tells how the waves grow with it. Windows whose values are all equal say
-// nothing where there is noise. The residuals of quadratics over 64 samples tell how far samples lie off fits that are
-// longer than the waves.
+// five neighbouring scan lines, times sqrt(5), tell the shared factors, which are the same for noise that is
+// independent from line to line. |D| for n = 16, by depth, tells how the waves grow with it. Windows whose values are
+// all equal say nothing where there is noise. The residuals of quadratics over 64 samples tell how far samples lie off
+// fits that are longer than the waves.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include "image/noise.hpp"

@@ -8,9 +8,9 @@
 // Eight equal values in a row say nothing of the noise: they belong to filled holes, a saturated or a simulated
 // background. The four in their middle do not count, and next to 32 of them nothing does. Where values are whole
 // multiples of a step, many neighbours are equal that belong to a slope; then the step, the least difference other than
-// zero, bounds the deviation by that of rounding, step / sqrt(12). But where nearly all of an image is constant, and its
-// few levels meet in clean steps, there is no noise. Where no four neighbours have data, as on a chequered mask, samples
-// two, three or four apart are taken for neighbours.
+// zero, bounds the deviation by that of rounding, step / sqrt(12). But where nearly all of an image is constant, and
+// its few levels meet in clean steps, there is no noise. Where no four neighbours have data, as on a chequered mask,
+// samples two, three or four apart are taken for neighbours.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <vector>

@@ -12,7 +12,6 @@
 namespace rangeedge {
 namespace {
 
-constexpr double correlation_max = 8;  // noise over a region, in units of that between neighbours
 constexpr int reach = 8;             // pixels from a border that tell how two surfaces meet there, and that it may move
 constexpr double least_sided = 0.7;  // share of them that lie on their side of where the surfaces meet
 constexpr double surely_beside = 2;  // pixels from a border

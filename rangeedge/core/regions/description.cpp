@@ -17,7 +17,6 @@
 namespace rangeedge {
 namespace {
 
-constexpr double curved_gain = 0.8;    // a quadratic must lower the rms of a plane to this share
 constexpr double least_relief = 1e-6;  // of the rms of a plane, in ranges of the ordinate
 constexpr int least_curved = 40;       // pixels; fewer tell no curvature
 

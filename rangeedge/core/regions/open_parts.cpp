@@ -163,7 +163,9 @@ std::vector<OpenBorder> OpenParts::borders() const {
 
 std::vector<std::pair<int, int>> OpenParts::near(const OpenBorder& border, int reach) {
     std::vector<std::pair<int, int>> found;
-    for (const int p : border.pixels) marked_[p] = 1, found.emplace_back(p, 0);
+    // Pixels that have gone to a third part since are not theirs.
+    for (const int p : border.pixels)
+        if (part_[p] == border.first || part_[p] == border.second) marked_[p] = 1, found.emplace_back(p, 0);
     for (std::size_t i = 0; i < found.size(); ++i) {
         const auto [p, distance] = found[i];
         if (distance == reach) break;

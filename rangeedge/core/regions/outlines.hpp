@@ -1,6 +1,6 @@
 // Outlines of regions along the borders of pixels. Regions that touch share their border: it is traced once, as an arc
-// from one corner of pixels at which three or four regions meet to the next, and the outline of either is a ring of such
-// arcs. Whatever is done to an arc happens to both outlines, which therefore leave no gap and do not overlap.
+// from one corner of pixels at which three or four regions meet to the next, and the outline of either is a ring of
+// such arcs. Whatever is done to an arc happens to both outlines, which therefore leave no gap and do not overlap.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <array>

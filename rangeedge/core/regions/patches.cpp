@@ -11,9 +11,8 @@
 namespace rangeedge {
 namespace {
 
-constexpr int max_cuts = 4;              // of one set of pixels into planes
-constexpr double grown = 1.1;            // a patch that may have become a roof, in pixels it had when it was none
-constexpr double correlation_max = 8.0;  // noise over a region, in units of that between neighbours
+constexpr int max_cuts = 4;    // of one set of pixels into planes
+constexpr double grown = 1.1;  // a patch that may have become a roof, in pixels it had when it was none
 
 }  // namespace
 

@@ -7,6 +7,9 @@
 
 namespace rangeedge {
 
+constexpr double curved_gain = 0.8;  // a quadratic must lower the rms of a plane to this share
+constexpr int least_curved = 40;     // pixels of a quadratic; fewer tell no curvature
+
 // One pixel: its place on the image plane in about pixels, its ordinate, and 1 / variance of the latter.
 struct Sample {
     double x, y, ordinate, weight;

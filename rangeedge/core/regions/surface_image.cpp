@@ -11,7 +11,6 @@ namespace rangeedge {
 namespace {
 
 constexpr double flat = 1.25;        // rms in standard deviations up to which a plane is one
-constexpr double curved_gain = 0.8;  // a quadratic must lower the rms to this share
 constexpr double resolution = 1e-6;  // of ordinates in single precision
 constexpr int sample_step = 61;      // one pixel in so many tells the typical noise
 

@@ -34,7 +34,7 @@ using Pixels = std::vector<int>;
 
 constexpr double lateral_deviation = 0.15;  // pixels: by how much a sample may stem from beside its line of sight
 constexpr int least_pixels = 12;            // of a surface
-constexpr int least_curved = 40;            // of a quadratic
+constexpr double correlation_max = 8;       // noise over a region, in units of that between neighbours
 
 // Pixels are known by their index in a copy with a margin of one pixel, so that each has all its neighbours.
 class SurfaceImage {

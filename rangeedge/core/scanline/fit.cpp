@@ -23,8 +23,8 @@ struct LineAndRest {
     }
 };
 
-// The coefficients c_i = sum y p_i / sum p_i^2 of the polynomials p_i of curve.hpp, which are orthogonal over the samples:
-// with those the normal equations of z = a x^2 + b x + c (paper, 4.2) fall apart. Of samples at any abscissas.
+// The coefficients c_i = sum y p_i / sum p_i^2 of the polynomials p_i of curve.hpp, which are orthogonal over the
+// samples: with those the normal equations of z = a x^2 + b x + c (paper, 4.2) fall apart. Of samples at any abscissas.
 LineAndRest fit_line(const PowerSums& sums) {
     LineAndRest fit;
     Curve& line = fit.line;

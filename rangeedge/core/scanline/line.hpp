@@ -26,8 +26,8 @@
 // Its angle phi changes with m by |dphi/dm| = |s r' - r s'| / (s^2 + r^2), primes for derivatives of the tangent's
 // coordinates by m, which is 1 / (s^2 + r^2) on the grid and kappa q / (s^2 + r^2) with a camera.
 //
-// Where the rays of a line do not lie in a plane (rays.hpp), its points are P(w) / y, and what is said of tangents holds
-// in the plane that touches the surface of the rays at w: with e = P / |P| and f = P' - (P' . e) e,
+// Where the rays of a line do not lie in a plane (rays.hpp), its points are P(w) / y, and what is said of tangents
+// holds in the plane that touches the surface of the rays at w: with e = P / |P| and f = P' - (P' . e) e,
 //
 //     (ds/dw, dr/dw) ~ (|f| y, (P' . e) y - |P| m).
 // SPDX-License-Identifier: Apache-2.0

@@ -26,8 +26,8 @@ bool RayFit::orient(const Vector& first, const Vector& last, const Vector& sum) 
     return true;
 }
 
-// The offset v across the line is linear in x, the place along it, and in z: the share of the middle on a cone, of which
-// a plane cuts the circle on the unit sphere, and x^2 through a lens.
+// The offset v across the line is linear in x, the place along it, and in z: the share of the middle on a cone, of
+// which a plane cuts the circle on the unit sphere, and x^2 through a lens.
 void RayFit::add(const Vector& point) {
     const Vector e = ray(point);
     const double x = dot(e, along_), z = ranges_ ? dot(e, middle_) : x * x, v = dot(e, across_);

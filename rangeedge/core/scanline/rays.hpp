@@ -8,9 +8,9 @@
 //
 // a quadratic whatever the plane, as the paper wants it. P is chosen by the rays:
 //
-// - On a cone of half-angle beta around the axis m, with t the angle around it from the middle of the line and a, b unit
-//   vectors across m at t = 0 and t = 90 degrees, the unit ray is cos(beta) m + sin(beta) (cos(t) a + sin(t) b). With
-//   w = 2 tan(t / 2), so that cos(t) = (1 - w^2/4) / (1 + w^2/4) and sin(t) = w / (1 + w^2/4),
+// - On a cone of half-angle beta around the axis m, with t the angle around it from the middle of the line and a, b
+//   unit vectors across m at t = 0 and t = 90 degrees, the unit ray is cos(beta) m + sin(beta) (cos(t) a + sin(t) b).
+//   With w = 2 tan(t / 2), so that cos(t) = (1 - w^2/4) / (1 + w^2/4) and sin(t) = w / (1 + w^2/4),
 //
 //       P(w) = (1 + w^2/4) cos(beta) m + sin(beta) ((1 - w^2/4) a + w b).
 //

@@ -70,8 +70,8 @@ struct ThreePoint {
         a = (slope_right - slope_left) * inverse;
         b = (slope_left * right + slope_right * left) * inverse;
     }
-    // |y - f(x)|, that is compared with the tolerance (paper, 4.1); for samples at equal distances find_worst_of_even has
-    // it for several at once.
+    // |y - f(x)|, that is compared with the tolerance (paper, 4.1); for samples at equal distances find_worst_of_even
+    // has it for several at once.
     T residual(T x, T y) const {
         const T t = x - origin;
         return std::abs(y - (ym + t * (b + a * t)));
