@@ -12,7 +12,8 @@ class Cancellation:
 
     Calls within the ``with`` block of a cancellation, in the thread that has entered it, raise
     ``concurrent.futures.CancelledError`` soon after `cancel` was called on any thread: within some 0.1 s while a kernel
-    works, else when the next one starts. Once cancelled it stays so. Blocks may be nested; each of them counts.
+    works, else, as while an image of many megapixels is checked, when the next one starts. Once cancelled it stays so.
+    Blocks may be nested; each of them counts.
 
     Ctrl-C needs none of this: it ends a call in Python's main thread as soon, by ``KeyboardInterrupt``. Either way
     nothing is left behind, and an array given as `dst` is as it was.

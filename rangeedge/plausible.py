@@ -82,8 +82,9 @@ def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
     coarse = src[::4, ::4][frame.valid[::4, ::4] > 0]
     if src.size < _LEAST_IMAGE or not len(coarse):
         return
-    values = src[frame.valid > 0]
-    for value in (values.max(), values.min()):
+    valid = frame.valid > 0
+    for bound in (np.max, np.min):
+        value = bound(src, where=valid, initial=coarse[0])  # without a copy of the image
         others = coarse[coarse != value].astype(np.float64)
         if not len(others):
             continue
