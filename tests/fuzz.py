@@ -177,6 +177,8 @@ def arguments(draw: Any, name: str, shape: tuple[int, int]) -> Any:
         return draw(images(shape, ["u1", "?"]))
     if name in LABELS:
         return draw(images(shape, ["i4"]))
+    if name == "truth":
+        return draw(images(shape, ["u1", "i4"]))
     if name in DEEP:
         return draw(images(shape, deep=True))
     if name in ABOVE:
