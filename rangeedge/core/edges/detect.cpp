@@ -292,11 +292,14 @@ std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOpti
     });
     clear_smear(parts, frame.rows, frame.cols, options.directions, smeared);
     std::int32_t order = 0;
-    for (Part& part : parts)
-        for (Candidate& c : part.found.candidates) c.order = order++;
-    std::vector<Candidate> candidates(static_cast<std::size_t>(order));
     Cells cells(frame.rows, frame.cols);
-    for (const Part& part : parts) cells.count(part.found.candidates);
+    for (Part& part : parts) {
+        Watch::checkpoint();
+        for (Candidate& c : part.found.candidates) c.order = order++;
+        cells.count(part.found.candidates);
+    }
+    std::vector<Candidate> candidates;
+    resize(candidates, static_cast<std::size_t>(order));
     for (const Part& part : parts) {
         Watch::checkpoint();
         cells.assign(part.found.candidates, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });

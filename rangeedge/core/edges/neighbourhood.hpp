@@ -25,8 +25,10 @@ enum Field { x_field, y_field, first_field };
 class NeighbourGrid {
 public:
     NeighbourGrid(const std::vector<Candidate>& candidates, int rows, int cols, int fields)
-        : cells_(rows, cols), stride_(candidates.size() + lanes), order_(candidates.size()), kinds_(stride_, 0),
-          fields_(stride_ * static_cast<std::size_t>(fields), 0.0f) {
+        : cells_(rows, cols), stride_(candidates.size() + lanes) {
+        resize(order_, candidates.size());
+        resize(kinds_, stride_);
+        resize(fields_, stride_ * static_cast<std::size_t>(fields));
         cells_.count(candidates);
         cells_.assign(candidates, [&](const Candidate& c, std::size_t k) {
             order_[k] = static_cast<std::int32_t>(&c - candidates.data());
