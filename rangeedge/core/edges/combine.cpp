@@ -10,7 +10,7 @@ namespace rangeedge {
 void combine(const std::vector<Candidate>& candidates, float* jump, float* crease, std::uint8_t* kind,
              float* significance) {
     constexpr int jumps = jump_bit | occluding_bit | occluded_bit, creases = convex_bit | concave_bit;
-    Checkpoints checkpoints;
+    Checkpoints checkpoints(64);  // each of which may be the first to touch its piece of memory
     // The largest jump of a pixel (paper, 4.2), and the side of it on which the pixel is.
     for (const Candidate& c : candidates) {
         checkpoints.pass();
