@@ -133,7 +133,7 @@ def test_wrap_knows_no_first_column(seed, threads):
         ]
     finally:
         cv2.setNumThreads(before)
-    assert len(found[0]) > 5
+    assert len(found[0]) > 2
     assert all(sets == found[0] for sets in found[1:])
 
 
