@@ -76,13 +76,14 @@ RANGEEDGE_WIDE void look_uphill(const std::int32_t* above, const std::int32_t* o
     }
 }
 
-// Marks the pixels of a row from which one of the four neighbours after it may differ.
+// Marks the pixels of basins in a row from which one of the four neighbours after it may differ.
 RANGEEDGE_WIDE void mark_borders(const int* __restrict own, const int* __restrict below, int n,
                                  std::uint8_t* __restrict differ) {
     differ[0] = differ[n - 1] = 1;  // a neighbour may lie beyond the end of the row
     for (int k = 1; k < n - 1; ++k) {
         const int a = own[k];
-        differ[k] = ((a ^ own[k + 1]) | (a ^ below[k - 1]) | (a ^ below[k]) | (a ^ below[k + 1])) != 0;
+        const bool alike = ((a ^ own[k + 1]) | (a ^ below[k - 1]) | (a ^ below[k]) | (a ^ below[k + 1])) == 0;
+        differ[k] = !alike & is_basin(a);
     }
 }
 
@@ -107,6 +108,12 @@ struct Pass {
     bool same_sides(const Pass& other) const { return a == other.a && b == other.b; }
 };
 
+// What there is of a seed in a basin: the pixels that reach a level. Number 0 is none.
+struct Seed {
+    int number = 0;
+    std::int32_t least = 0;
+};
+
 class Landscape {
 public:
     Landscape(const float* distance, const std::uint8_t* mask, int rows, int cols, bool wrap, float lowest, Team& team,
@@ -119,9 +126,9 @@ public:
     // The highest pass between any two basins that touch, and some lower ones; the highest first. Those that are lower
     // than `share` of the summits on both sides are left out: a way over one of them leads to no peak that counts.
     std::vector<Pass> find_passes(const Array<float>& share) const;
-    // Markers become `seed` of their basin where the pixel is at least as high as its `least`, else 0; and then those
-    // of seeds numbered anew, in raster order of their first pixels. Seeds are numbered from 1 to `seeds`.
-    void paint(const Array<int>& seed, const Array<std::int32_t>& least, int seeds);
+    // Markers become numbers of seeds, of which there are `count`, by what there is of them in the basins; and these
+    // are numbered anew, in raster order of their first pixels.
+    void paint(const Array<Seed>& seeds, int count);
 
     // Of two pixels of one distance, that of lower index is the higher.
     bool higher(int p, int q) const { return distance_[p] > distance_[q] || (distance_[p] == distance_[q] && p < q); }
@@ -199,7 +206,7 @@ Array<int> Landscape::find_basins() {
     std::vector<Found> found(static_cast<std::size_t>(team_.size()));
     parallel_for(rows_, team_, [&](int first, int last, int thread) {
         look_uphill_in(first, last);
-        // Ways are shortened while they are followed. In the end they lead to a summit or an exit at once.
+        // Ways are shortened once they are followed: they lead to a summit or an exit at once.
         auto& [summits, exits] = found[static_cast<std::size_t>(thread)];
         const int begin = index(first, 0), end = index(last, 0);
         const auto leaves = [=](int q) { return q < begin || q >= end; };
@@ -214,11 +221,8 @@ Array<int> Landscape::find_basins() {
             } else if (leaves(q)) {
                 exits.push_back(p);
             } else {
-                for (int next = up[q]; next != q && !leaves(next); next = up[q]) {
-                    if (!leaves(up[next])) up[q] = up[next];
-                    q = next;
-                }
-                up[p] = q;
+                for (int next = up[q]; next != q && !leaves(next); next = up[q]) q = next;
+                for (int r = p; r != q;) r = std::exchange(up[r], q);
             }
         }
     });
@@ -293,32 +297,32 @@ std::vector<Pass> Landscape::find_passes(const Array<float>& share) const {
     return all;
 }
 
-void Landscape::paint(const Array<int>& seed, const Array<std::int32_t>& least, int seeds) {
+void Landscape::paint(const Array<Seed>& seeds, int count) {
     constexpr int nowhere = std::numeric_limits<int>::max();
-    std::vector<Array<int>> first_pixels(static_cast<std::size_t>(team_.size()), Array<int>(seeds + 1, nowhere));
+    std::vector<Array<int>> first_pixels(static_cast<std::size_t>(team_.size()), Array<int>(count + 1, nowhere));
     parallel_for(rows_, team_, [&](int first, int last, int thread) {
         Array<int>& first_pixel = first_pixels[static_cast<std::size_t>(thread)];
-        Checkpoints checkpoints;
+        int before = 0;
         for (int p = index(first, 0); p < index(last, 0); ++p) {
-            checkpoints.pass();
             int own = 0;
             if (is_basin(markers_[p])) {
-                const int basin = basin_of(markers_[p]);
-                own = level(p) >= least[basin] ? seed[basin] : 0;
-                first_pixel[own] = std::min(first_pixel[own], p);
+                const Seed& seed = seeds[basin_of(markers_[p])];
+                own = level(p) >= seed.least ? seed.number : 0;
             }
             markers_[p] = own;
+            if (own != before) first_pixel[own] = std::min(first_pixel[own], p);
+            before = own;
         }
     });
     Array<int>& first_pixel = first_pixels.front();
     std::vector<int> order;
-    for (int s = 1; s <= seeds; ++s) {
+    for (int s = 1; s <= count; ++s) {
         for (const Array<int>& of_thread : first_pixels) first_pixel[s] = std::min(first_pixel[s], of_thread[s]);
         order.push_back(s);
     }
     std::sort(order.begin(), order.end(), [&](int a, int b) { return first_pixel[a] < first_pixel[b]; });
-    Array<int> number(seeds + 1, 0);
-    for (int n = 0; n < seeds; ++n) number[order[static_cast<std::size_t>(n)]] = n + 1;
+    Array<int> number(count + 1, 0);
+    for (int n = 0; n < count; ++n) number[order[static_cast<std::size_t>(n)]] = n + 1;
     parallel_for(rows_, team_, [&](int first, int last, int) {
         for (int p = index(first, 0); p < index(last, 0); ++p) markers_[p] = number[markers_[p]];
     });
@@ -352,29 +356,26 @@ int extract_seeds(const float* distance, const std::uint8_t* mask, int height, i
         joins.push_back({low, high, pass.level});
     }
 
-    // Every basin's seed and its least level. An island joined another one after all that had joined itself.
-    Array<int> seed(count, 0);
-    Array<std::int32_t> least(count, 0);
-    int seeds = 0;
+    // An island joined another one after all that had joined itself.
+    Array<Seed> seeds(count);
+    int found = 0;
     const auto found_peak = [&](int summit) {
         if (landscape[summits[summit]] < min_distance) return;
-        seed[summit] = ++seeds;
         // Where all is infinitely far, or `separation` vanishes in single precision, nothing but no pixel is too low.
-        least[summit] = bits_of(share[summit] > 0 ? share[summit] : std::numeric_limits<float>::denorm_min());
+        const float least = std::max(share[summit], std::numeric_limits<float>::denorm_min());
+        seeds[summit] = {++found, bits_of(least)};
     };
     for (int i = 0; i < count; ++i)
         if (islands.is_root(i)) found_peak(i);
     for (std::size_t k = joins.size(); k-- > 0;) {
         const auto [low, high, level] = joins[k];
-        if (value_of(level) < share[low]) {
+        if (value_of(level) < share[low])
             found_peak(low);
-        } else if (seed[high] && level >= least[high]) {
-            seed[low] = seed[high];
-            least[low] = least[high];
-        }
+        else if (level >= seeds[high].least)
+            seeds[low] = seeds[high];
     }
-    landscape.paint(seed, least, seeds);
-    return seeds;
+    landscape.paint(seeds, found);
+    return found;
 }
 
 }  // namespace rangeedge
