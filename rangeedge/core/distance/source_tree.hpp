@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "base/parallel.hpp"
@@ -217,12 +218,18 @@ private:
         return whole;
     }
 
+    static bool is_blank(const T* values, int n) {
+        static constexpr T none[tile_size] = {};
+        return std::memcmp(values, none, sizeof(T) * static_cast<std::size_t>(n)) == 0;
+    }
+
     Block smallest_block(Sources& found, int y0, int x0, Moments& moments) const {
         const int y1 = std::min(y0 + tile_size, grid_.rows), x1 = std::min(x0 + tile_size, grid_.cols + beyond_);
         const int begin = found.groups();
         const std::size_t first = found.weight.size();
         Block whole;
-        for (int y = y0; y < y1; ++y)
+        for (int y = y0; y < y1; ++y) {
+            if (x0 >= 0 && x1 <= grid_.cols && is_blank(salience_ + grid_.index(y, x0), x1 - x0)) continue;
             for (int position = x0; position < x1; ++position) {
                 const int x = position < 0 ? position + grid_.cols : position % grid_.cols;
                 const std::size_t p = grid_.index(y, x);
@@ -237,6 +244,7 @@ private:
                 whole.add(source);
                 moments.add(position, y, s);
             }
+        }
         if (moments.n == 0) return {};
         whole.fit_slopes(moments);
         for (std::size_t i = first; i < found.weight.size(); ++i)
