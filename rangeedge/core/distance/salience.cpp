@@ -121,7 +121,7 @@ private:
             const double row = tile.y + p / tile_size, col = tile.x + p % tile_size;
             if (second[p] <= close) number = nearest_exactly(row, col, close);
             squared[p] = squared_distance(number, row, col);
-            salience[p] = contenders_[at(number)].salience;
+            salience[p] = contenders_[at(number)].level / salience_unit<T>;
             label[p] = contenders_[at(number)].label;
         }
         float distance[tile_pixels];

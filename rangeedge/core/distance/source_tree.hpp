@@ -24,7 +24,7 @@ void append(std::vector<T>& to, const std::vector<T>& more) {
 }
 
 struct Source {
-    double level, salience;  // as in the map, and in (0, 1]
+    float level;  // as in the map
     std::int32_t label;
 };
 
@@ -164,7 +164,7 @@ public:
             Moments moments;
             branch.root = grow(branch, top, i / across * size, i % across * size - beyond_, moments);
         });
-        for (const Branch& branch : branches) {
+        for (Branch& branch : branches) {
             const auto parts_before = [&](std::size_t level) {
                 return level > 0 ? levels[level - 1].groups() : sources.groups();
             };
@@ -174,6 +174,7 @@ public:
             for (std::size_t level = levels.size() - 1; level-- > 0;)
                 levels[level].append(branch.levels[level], parts_before(level));
             sources.append(branch.sources);
+            branch = {};
         }
         while (levels.back().weight.size() % group_size) levels.back().push({});
     }
@@ -238,7 +239,7 @@ private:
                 const double s = level / salience_unit<T>;
                 const auto w = static_cast<float>(1.0 / (s * s)), col = static_cast<float>(position),
                            line = static_cast<float>(y);
-                found.push(w, col, line, {level, s, static_cast<std::int32_t>(p)});
+                found.push(w, col, line, {static_cast<float>(salience_[p]), static_cast<std::int32_t>(p)});
                 Block source{w, col, line, col, col, line, line};
                 source.end = 1;  // not empty
                 whole.add(source);
@@ -248,7 +249,7 @@ private:
         if (moments.n == 0) return {};
         whole.fit_slopes(moments);
         for (std::size_t i = first; i < found.weight.size(); ++i)
-            whole.raise_to(found.exact[i].salience - whole.rise(found.x[i], found.y[i]));
+            whole.raise_to(found.exact[i].level / salience_unit<T> - whole.rise(found.x[i], found.y[i]));
         found.fill_group();
         whole.begin = begin;
         whole.end = found.groups();
