@@ -128,21 +128,27 @@ private:
     std::array<double, sizeof(T) == 1 ? 256 : 0> of_{};
 };
 
-// Columns that one thread treats together: whole cache lines of a row.
-constexpr int strip = 64;
+// Columns that one thread treats together: whole cache lines of a row, and more of them where an image is so wide that
+// there are strips enough, since rows are read faster the longer they are.
+constexpr int least_strip = 64, most_strip = 512;
+
+int strip_width(int cols, int threads) {
+    constexpr int strips = 4;  // of a thread
+    return std::clamp(cols / (strips * threads) / least_strip * least_strip, least_strip, most_strip);
+}
 
 // rows[p]: the row of the source in p's own column that is nearest to p; -1 for none. Here without penalties: the last
 // source above or the next below, of which the upper one where both are equally near.
 void nearest_in_columns(const Edges& sources, const Grid& grid, int first, int last, std::int32_t* rows) {
     constexpr std::int32_t none = std::numeric_limits<std::int32_t>::min() / 2;
-    std::int32_t nearest[strip];
-    std::fill_n(nearest, strip, none);
+    std::int32_t nearest[most_strip];
+    std::fill_n(nearest, last - first, none);
     for (int y = 0; y < grid.rows; ++y) {
         const std::uint8_t* edges = sources.edges + grid.index(y, first);
         std::int32_t* row = rows + grid.index(y, first);
         for (int c = 0; c < last - first; ++c) row[c] = nearest[c] = edges[c] ? y : nearest[c];
     }
-    std::fill_n(nearest, strip, -none);
+    std::fill_n(nearest, last - first, -none);
     for (int y = grid.rows - 1; y >= 0; --y) {
         std::int32_t* row = rows + grid.index(y, first);
         for (int c = 0; c < last - first; ++c) {
@@ -155,7 +161,7 @@ void nearest_in_columns(const Edges& sources, const Grid& grid, int first, int l
 
 template <class Sources>
 void nearest_in_columns(const Sources& sources, const Grid& grid, int first, int last, std::int32_t* rows) {
-    std::vector<Envelope> envelopes(strip);
+    std::vector<Envelope> envelopes(static_cast<std::size_t>(last - first));
     const auto envelope = [&](int c) -> Envelope& { return envelopes[static_cast<std::size_t>(c)]; };
     for (int c = 0; c < last - first; ++c) envelope(c).reset(grid.rows, grid.aspect());
     for (int y = 0; y < grid.rows; ++y)
@@ -163,8 +169,8 @@ void nearest_in_columns(const Sources& sources, const Grid& grid, int first, int
             const std::size_t p = grid.index(y, x);
             if (sources.is_source(p)) envelope(x - first).push(y, sources.height(p), y);
         }
-    std::int32_t current[strip];
-    int next[strip] = {}, change[strip];  // the next piece and the row at which it begins
+    std::int32_t current[most_strip];
+    int next[most_strip] = {}, change[most_strip];  // the next piece and the row at which it begins
     for (int c = 0; c < last - first; ++c) {
         current[c] = -1;
         change[c] = envelope(c).size() > 0 ? 0 : grid.rows;
@@ -227,7 +233,7 @@ template <class Sources>
 void nearest_by_sum(const Sources& sources, const Grid& grid, float* distance, std::int32_t* labels, int threads) {
     static_assert(sizeof(float) == sizeof(std::int32_t));
     std::int32_t* const rows = reinterpret_cast<std::int32_t*>(distance);
-    const int strips = (grid.cols - 1) / strip + 1;
+    const int strip = strip_width(grid.cols, threads), strips = (grid.cols - 1) / strip + 1;
     constexpr int bunch = 8;  // rows
     Team team(std::min(threads, std::max(strips, grid.rows / bunch)));
     parallel_each(strips, team, [&](int s, int) {
