@@ -22,6 +22,7 @@
 #include "base/disjoint_sets.hpp"
 #include "base/parallel.hpp"
 #include "base/simd.hpp"
+#include "regions/marks.hpp"
 
 namespace rangeedge {
 namespace {
@@ -61,18 +62,6 @@ RANGEEDGE_WIDE void mark_borders(const int* __restrict own, int stride, int n, s
     for (int k = 0; k < n; ++k) {
         const int a = own[k];
         differ[k] = ((a ^ own[k + 1]) | (a ^ below[k - 1]) | (a ^ below[k]) | (a ^ below[k + 1])) != 0;
-    }
-}
-
-// Calls visit(k) where a mark is set; marks are followed by eight more bytes.
-template <class F>
-void for_marked(const std::uint8_t* marks, int n, F&& visit) {
-    std::uint64_t eight;
-    for (int k = 0; k < n; k += static_cast<int>(sizeof eight)) {
-        std::memcpy(&eight, marks + k, sizeof eight);
-        if (!eight) continue;
-        for (int i = k; i < std::min(k + static_cast<int>(sizeof eight), n); ++i)
-            if (marks[i]) visit(i);
     }
 }
 
@@ -244,7 +233,7 @@ std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
                 passes.push_back(pass);
             }
         };
-        std::vector<std::uint8_t> differ(static_cast<std::size_t>(cols_) + sizeof(std::uint64_t));
+        std::vector<std::uint8_t> differ(marks_size(cols_));
         for (int row = first; row < last; ++row) {
             Watch::checkpoint();
             const int begin = index(row, 0);
