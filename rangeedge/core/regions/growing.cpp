@@ -15,14 +15,14 @@
 namespace rangeedge {
 namespace {
 
-constexpr double tile_tolerance = 0.8;       // root mean square misfit of a tile, in tolerances of a pixel
-constexpr double shares[]{0.5, 1};           // of the mean square misfit: tiles that fit well come first
-constexpr int rounds_between_tiles = 8;      // of pixels
-constexpr int worth_tiles = 600;             // one pixel in so many that grew meanwhile
-constexpr int most_adjustments = 8;          // rounds at borders
-constexpr std::size_t prefetched = 12;       // pixels ahead
-constexpr std::size_t worth_threads = 1024;  // pixels
-constexpr std::size_t tiles_worth_threads = 64;
+constexpr double tile_tolerance = 0.8;      // root mean square misfit of a tile, in tolerances of a pixel
+constexpr double shares[]{0.5, 1};          // of the mean square misfit: tiles that fit well come first
+constexpr int rounds_between_tiles = 8;     // of pixels
+constexpr int worth_tiles = 600;            // one pixel in so many that grew meanwhile
+constexpr int most_adjustments = 8;         // rounds at borders
+constexpr std::size_t prefetched = 12;      // pixels ahead
+constexpr std::size_t worth_threads = 256;  // pixels
+constexpr std::size_t tiles_worth_threads = 16;
 
 // Each once, in raster order.
 void sort_out(std::vector<int>& tiles) {
@@ -148,18 +148,27 @@ void Grower::for_patches(bool shared, F&& body) {
 
 void Grower::over_tiles(const Tiles& tiles) {
     // Tiles of pixels that touch a patch, in raster order.
-    tiles_.clear(), taken_.clear();
-    for (const int p : front_) {
+    for_front([&](int p, std::size_t thread) {
+        std::vector<int>& found = found_[thread];
         const int t = tiles.at(p);
-        if (t >= 0 && (tiles_.empty() || t != tiles_.back())) tiles_.push_back(t);
-    }
+        if (t >= 0 && (found.empty() || t != found.back())) found.push_back(t);
+    });
+    tiles_.clear(), taken_.clear();
+    gather(tiles_);
     sort_out(tiles_);
     const double limit = tile_tolerance * tile_tolerance * limit_;
     for (const double share : shares) over_tiles(tiles, share * limit);
-    for (const int t : taken_)
-        for_around(tiles, t, image_.stride(), [&](int q) {
-            if (patches_.is_free(q, reach_)) wait(q);
-        });
+    // The free pixels around those that were taken come to the front.
+    parallel_for(static_cast<int>(taken_.size()), patches_.team(), [&](int begin, int end, int thread) {
+        for (int k = begin; k < end; ++k)
+            for_around(tiles, taken_[static_cast<std::size_t>(k)], image_.stride(), [&](int q) {
+                if (patches_.is_free(q, reach_) && !waiting_[q]) found_[static_cast<std::size_t>(thread)].push_back(q);
+            });
+    });
+    for (std::vector<int>& of_thread : found_) {
+        for (const int p : of_thread) wait(p);
+        of_thread.clear();
+    }
 }
 
 // Takes tiles whose misfit is below `limit`, and those around them in turn. Others that were looked at are left in

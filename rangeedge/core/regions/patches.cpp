@@ -92,8 +92,10 @@ void PatchMap::flatten() {
 }
 
 void PatchMap::refit() {
-    for (Patch& p : patches_)
-        if (p.count()) p.surface = image_.surface_of(p.sums);
+    parallel_for(count(), team_, [&](int begin, int end, int) {
+        for (int i = begin; i < end; ++i)
+            if (patch(i).count()) patch(i).surface = image_.surface_of(patch(i).sums);
+    });
 }
 
 std::vector<SurfaceSums> PatchMap::sums_of(const std::vector<Pixels>& sets) const {
@@ -111,24 +113,36 @@ void PatchMap::add_markers(const std::int32_t* markers) {
         std::int32_t marker;
         int begin, end;
     };
+    std::vector<std::vector<Run>> found(static_cast<std::size_t>(team_.size()));
+    parallel_for(image_.rows(), team_, [&](int first, int last, int thread) {
+        for (int row = first; row < last; ++row)
+            for (int col = 0; col < image_.cols();) {
+                const std::int32_t* const m = markers + std::ptrdiff_t{row} * image_.cols();
+                const std::int32_t marker = m[col];
+                const int begin = col;
+                while (col < image_.cols() && m[col] == marker) ++col;
+                if (marker <= 0) continue;
+                found[static_cast<std::size_t>(thread)].push_back(
+                    {marker, image_.index(row, begin), image_.index(row, col)});
+            }
+    });
     std::vector<Run> runs;
-    for (int row = 0; row < image_.rows(); ++row)
-        for (int col = 0; col < image_.cols();) {
-            const std::int32_t* const m = markers + row * image_.cols();
-            const std::int32_t marker = m[col];
-            const int begin = col;
-            while (col < image_.cols() && m[col] == marker) ++col;
-            if (marker > 0) runs.push_back({marker, image_.index(row, begin), image_.index(row, col)});
-        }
+    for (const auto& of_thread : found) runs.insert(runs.end(), of_thread.begin(), of_thread.end());
     std::stable_sort(runs.begin(), runs.end(), [](const Run& a, const Run& b) { return a.marker < b.marker; });
-    std::vector<Pixels> sets;
-    Checkpoints checkpoints;
-    for (std::size_t k = 0; k < runs.size(); ++k) {
-        checkpoints.pass();
-        if (k == 0 || runs[k].marker != runs[k - 1].marker) sets.emplace_back();
-        for (int p = runs[k].begin; p < runs[k].end; ++p)
-            if (image_.open(p)) sets.back().push_back(p);
-    }
+    std::vector<std::size_t> start;  // of every marker
+    for (std::size_t k = 0; k < runs.size(); ++k)
+        if (k == 0 || runs[k].marker != runs[k - 1].marker) start.push_back(k);
+    std::vector<Pixels> sets(start.size());
+    start.push_back(runs.size());
+    parallel_each(static_cast<int>(sets.size()), team_, [&](int i, int) {
+        const auto n = static_cast<std::size_t>(i);
+        Checkpoints checkpoints;
+        for (std::size_t k = start[n]; k < start[n + 1]; ++k) {
+            checkpoints.pass();
+            for (int p = runs[k].begin; p < runs[k].end; ++p)
+                if (image_.open(p)) sets[n].push_back(p);
+        }
+    });
     const std::vector<SurfaceSums> sums = sums_of(sets);
     estimate_correlation(sums);
     add_patches(sets, sums, HUGE_VAL);
