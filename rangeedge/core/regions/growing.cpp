@@ -275,10 +275,10 @@ void Grower::commit(bool refit) {
     });
 }
 
-// One round: the pixels of the front that are `wanted` go where they choose, all at once, and those around them that
-// are wanted then become the front. Returns how many went.
-template <class Wanted, class Choose>
-int Grower::over_front(Wanted&& wanted, Choose&& choose, bool refit) {
+// One round: the pixels of the front go where they choose, all at once, and the pixels q beside one that went, p, for
+// which concerns(p, q) holds, become the front. Returns how many went.
+template <class Choose, class Concerns>
+int Grower::over_front(Choose&& choose, Concerns&& concerns, bool refit) {
     if (++round_ == 0) {
         std::fill(came_.begin(), came_.end(), std::uint8_t{0});
         round_ = 1;
@@ -286,21 +286,24 @@ int Grower::over_front(Wanted&& wanted, Choose&& choose, bool refit) {
     const auto threads = static_cast<std::size_t>(patches_.team().size());
     for_front([&](int p, std::size_t thread) {
         waiting_[p] = 0;
-        const int i = wanted(p) ? choose(p) : 0;
+        const int i = choose(p);
         if (i) offers_[thread * threads + static_cast<std::size_t>(i) % threads].push_back({p, i});
     });
     std::size_t count = 0;
     for (const std::vector<Offer>& offers : offers_) count += offers.size();
     commit(refit);
-    const std::array<int, 5> around{0, -image_.stride(), -1, 1, image_.stride()};
+    const std::array<int, 4> around = image_.neighbours();
     for_front([&](int p, std::size_t thread) {
         if (came_[p] != round_) return;
         for (std::size_t k = 0; k < around.size(); ++k) {
             const int q = p + around[k];
-            if (!wanted(q)) continue;
+            if (!concerns(p, q)) continue;
             // Of all that came beside it, the first counts.
             bool found = false;
-            for (std::size_t other = 0; other < k; ++other) found = found || came_[q - around[other]] == round_;
+            for (std::size_t other = 0; other < k; ++other) {
+                const int beside = q - around[other];
+                found = found || (came_[beside] == round_ && concerns(beside, q));
+            }
             if (found) continue;
             waiting_[q] = pixel_waits;
             found_[thread].push_back(q);
@@ -315,8 +318,8 @@ int Grower::over_front(Wanted&& wanted, Choose&& choose, bool refit) {
 int Grower::over_pixels(int rounds, bool refit) {
     int count = 0;
     for (int round = 0; round < rounds && !front_.empty(); ++round)
-        count +=
-            over_front([&](int p) { return patches_.is_free(p, reach_); }, [&](int p) { return choose(p); }, refit);
+        count += over_front([&](int p) { return patches_.is_free(p, reach_) ? choose(p) : 0; },
+                            [&](int, int q) { return patches_.is_free(q, reach_); }, refit);
     return count;
 }
 
@@ -335,7 +338,7 @@ void Grower::adjust_borders() {
         return best.patch;
     };
     for (int round = 0; round < most_adjustments && !front_.empty(); ++round)
-        over_front([&](int p) { return patches_[p] != 0; }, choose_other, false);
+        over_front(choose_other, [&](int p, int q) { return patches_[q] && patches_[q] != patches_[p]; }, false);
     for (const int p : front_) waiting_[p] = 0;
     front_.clear();
 }

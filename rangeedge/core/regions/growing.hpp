@@ -50,8 +50,8 @@ private:
     void for_patches(bool shared, F&& body);
     int choose(int p) const;
     void commit(bool refit);
-    template <class Wanted, class Choose>
-    int over_front(Wanted&& wanted, Choose&& choose, bool refit);
+    template <class Choose, class Concerns>
+    int over_front(Choose&& choose, Concerns&& concerns, bool refit);
     void wait(int p);
     template <class F>
     void for_front(F&& body);

@@ -11,10 +11,10 @@
 namespace rangeedge {
 namespace {
 
-constexpr double roof_gain = 0.97;  // two planes must lower the rms of the quadratic to this share
-constexpr double chance_gain = 4;   // by chance
-constexpr int roof_rounds = 8;
-constexpr double rounded = 2.5;  // pixels on either side of a ridge that may be rounded
+constexpr double roof_gain = 0.97;                // two planes must lower the rms of the quadratic to this share
+constexpr double chance_gain = 4;                 // by chance
+constexpr int roof_rounds = 8, roof_promise = 3;  // after which two planes are to be better
+constexpr double rounded = 2.5;                   // pixels on either side of a ridge that may be rounded
 constexpr std::size_t most_samples = 1024;
 const double pi = std::acos(-1.0);
 
@@ -72,6 +72,7 @@ bool split_roof(const SurfaceImage& image, const Pixels& pixels, const Surface& 
             of_roof += s.weight * r * r, of_curved += misfit;
         }
         if (round && side_a.count() == before) break;
+        if (round == roof_promise && of_roof > of_curved) return false;
     }
     const double chance = chance_gain * image.correlation_area() / static_cast<double>(pixels.size());
     const double gain = std::max(1 - roof_gain * roof_gain, chance);
