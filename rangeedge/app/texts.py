@@ -17,11 +17,14 @@ INPUT = """A range image: 16-bit or float PNG, TIFF, PGM, EXR, PFM, NPY, NPZ, or
 or a file of an ABW, Perceptron or Technical Arts scanner. With a pinhole camera give -K; without, the image is
 taken as a regular grid."""
 
+PARAMS = """A file of options, saved in the explorer or by ScanLineDetector.save; flags given beside it come first."""
+
 EPILOGUES = {
     "detect": """examples:
   rangeedge detect depth.png -K 525,525,319.5,239.5 --out edges     # 16-bit millimetres of a depth camera
   rangeedge detect terrain.tiff --pixel-size 0.5 --height-map --out edges
-  rangeedge detect cloud.pcd --crease-threshold 20 --out edges""",
+  rangeedge detect cloud.pcd --crease-threshold 20 --out edges
+  rangeedge detect depth.png --params detector.yml --out edges      # saved in the explorer""",
     "segment": """examples:
   rangeedge segment depth.png -K 525,525,319.5,239.5 --out regions
   rangeedge segment cloud.pcd --min-area 300 --out regions
@@ -65,6 +68,6 @@ USAGES = {
     "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
     "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
     "demo": "[--real] [options] --out DIR",
-    "explore": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [--host ADDRESS] [--port N] [--no-browser]",
+    "explore": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options] [--host ADDRESS] [--port N] [--no-browser]",
     "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
 }
