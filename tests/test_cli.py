@@ -279,7 +279,8 @@ class TestBadInput:
             ([*CAMERA, "--noise", "-1"], "`noise` must be"),
             ([*CAMERA, "--mask", "missing.png"], "cannot read 'missing.png'"),
             ([*CAMERA, "--calibration", "1"], "no ABW image"),
-            ([*CAMERA, "--sharpness", "1"], "unrecognized arguments: --sharpness"),
+            ([*CAMERA, "--sharpness", "1"], "unknown argument --sharpness"),
+            ([*CAMERA, "--crease-treshold=1"], "did you mean --crease-threshold?"),
         ],
     )
     def test_options(self, image, tmp_path, capsys, argv, message):
@@ -539,6 +540,11 @@ def test_saved_parameters_are_those_of_the_flags(image, saved, tmp_path, capsys)
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert run(capsys, "batch", image, "--params", saved, "--out", tmp_path / "batch")[0] == 0
     assert (tmp_path / "batch/box/thin.png").read_bytes() == (tmp_path / "detect/file/thin.png").read_bytes()
+
+
+def test_numbers_may_have_blanks_between(image, tmp_path, capsys):
+    assert run(capsys, "detect", image, "-K", "100 100 39.5 29.5", "--out", tmp_path / "a")[0] == 0
+    assert json.loads((tmp_path / "a/report.json").read_text())["options"]["K"][0] == [100, 0, 39.5]
 
 
 def test_flags_come_before_saved_parameters(image, saved, tmp_path, capsys):

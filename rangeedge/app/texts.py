@@ -67,7 +67,7 @@ USAGES = {
     "clean": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out FILE",
     "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
     "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
-    "demo": "[--real] [options] --out DIR",
+    "demo": "[--real] [options] [--out DIR]",
     "explore": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options] [--host ADDRESS] [--port N] [--no-browser]",
     "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
 }
