@@ -416,6 +416,7 @@ class TestHelp:
         code, said, _ = run(capsys, command, "--help")
         assert code == 0
         assert "examples:" in said
+        assert "paper" not in said  # which nobody needs to have read
         assert "None" not in said.replace("None: ", "")
         assert "`" not in said.replace("`rangeedge", "").replace("`detect`", "").replace("`demo`", "")
 

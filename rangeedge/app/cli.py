@@ -40,7 +40,7 @@ from .results import (
     region_files,
     write_folder,
 )
-from .texts import EPILOGUES, FIRST_STEPS, INPUT, PARAMS, PURPOSE, USAGES
+from .texts import DETAILS, EPILOGUES, FIRST_STEPS, GROUPS, INPUT, PARAMS, PURPOSE, USAGES
 from .understood import in_flags, sentence, told_warnings
 
 
@@ -164,7 +164,7 @@ def _command(commands: Any, name: str, run: Callable[[argparse.Namespace], int],
     parser = commands.add_parser(
         name,
         help=purpose,
-        description=f"{purpose[0].upper()}{purpose[1:]}.",
+        description=f"{purpose[0].upper()}{purpose[1:]}.\n\n{DETAILS[name]}",
         epilog=EPILOGUES[name],
         formatter_class=argparse.RawDescriptionHelpFormatter,
         argument_default=argparse.SUPPRESS,
@@ -194,11 +194,11 @@ def _add_geometry(parser: argparse.ArgumentParser) -> None:
 def _add_detector(parser: argparse.ArgumentParser) -> None:
     _add_options(parser, "which edges are kept", SELECTION)
     own = {name: option for name, option in SCAN_LINES.items() if name not in GEOMETRY}
-    _add_options(parser, "how edges are found (the fields of ScanLineParams)", own)
+    _add_options(parser, "how edges are found", own)
 
 
 def _add_options(parser: argparse.ArgumentParser, title: str, options: Mapping[str, Option]) -> None:
-    group = parser.add_argument_group(title)
+    group = parser.add_argument_group(title, GROUPS.get(title))
     for option in options.values():
         _add_option(group, option)
 
@@ -223,7 +223,7 @@ def _help(option: Option) -> str:
     """What the option means, in the words of the command line."""
     if option.flagged:
         return option.flagged
-    text, default = option.text, option.default
+    text, default = re.sub(r" \(paper,[^)]*\)|the paper has ", "", option.text), option.default
     for name in (*DETECTION, *Growing.options):
         text = text.replace(f"`{name}`", _flag(name))
     for word, value in option.choices.items():
