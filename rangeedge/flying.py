@@ -12,6 +12,7 @@ from ._option import parsed, takes
 from .edges import kernel_options
 from .frame import Frame
 from .noise import measured_frame
+from .noise_model import NoiseModel
 from .options import SCAN_LINES, ScanLineParams
 from .sectors import sectors_of
 
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 _DIRECTIONS = [(down, right) for down in (-1, 0, 1) for right in (-1, 0, 1) if down or right]
 _LAST_STEP, _STEP = 2.5, 1.5  # of a limb, at most as high as so many times the one before
+_SMOOTHED = 1.8  # correlation of the noise of sensors that smooth their depths over some pixels
 _SECOND_DIFFERENCE = 6**0.5  # its standard deviation, in those of depths
 
 
@@ -49,6 +51,8 @@ def flyingPixels(
     they have no more than two pixels; on a grid of `pixelSize` 1, as None is, there are no such angles, and all count.
     A pixel that continues a slope is none, as at the limb of a round surface: along a row, a column or a diagonal it
     falls off from the three pixels beside it no less than these do, and up to 2.5 times as far as the last of them.
+    Not so where the sensor smooths its depths, of which a noise with a `correlation` above 1.8 tells: smeared steps
+    fall off as limbs do.
     `edgeStrength` has no creases on these pixels, and one jump of the full height across them.
 
     Parameters
@@ -106,6 +110,8 @@ def _flying(frame: Frame, params: ScanLineParams) -> np.ndarray:
 
 def keep_limbs(frame: Frame, params: ScanLineParams, flying: np.ndarray) -> None:
     """Clear the pixels of `flying` that continue a slope: up to `maxSmear` in a row, the next after the others."""
+    if isinstance(frame.noise, NoiseModel) and frame.noise.correlation > _SMOOTHED:
+        return
     pixels = np.flatnonzero(flying)
     for _ in range(params.maxSmear):
         limb = _continues(frame, flying, pixels)
