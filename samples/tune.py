@@ -66,7 +66,7 @@ def draw_curve(axes, name, curve):
     places = np.arange(len(curve))
     axes.plot(places, curve[:, 1], "o-", color=BLUE, label="precision")
     axes.plot(places, curve[:, 0], "s--", color=VERMILION, label="recall")
-    default = signature(rangeedge.detectEdges).parameters[name].default
+    default = signature(rangeedge.detectEdges).parameters[name].default or 20  # which None is for lineSignificance
     axes.axvline(np.interp(default, SWEEPS[name], places), color="0.4", linestyle=":")
     axes.set(title=name, xticks=places, xticklabels=[f"{value:g}" for value in SWEEPS[name]], ylim=(0, 1.03))
     axes.grid(color="0.9")
