@@ -224,7 +224,7 @@ def test_an_image_without_noise_is_silent():
         assert cv2.dilate(edges.astype(np.uint8), np.ones((5, 5)))[(truth > 0) & (truth < 4)].mean() > 0.99
 
 
-@pytest.mark.filterwarnings("ignore:.*far from all others")
+@pytest.mark.filterwarnings("ignore:.*far from the others")
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("geometry", [dict(), dict(K=K), dict(heightMap=True)])

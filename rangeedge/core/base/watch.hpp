@@ -4,14 +4,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <cstddef>
 #include <exception>
 #include <functional>
 #include <utility>
-#include <vector>
 
 namespace rangeedge {
 
@@ -84,16 +81,5 @@ public:
 private:
     int steps_, left_;
 };
-
-// Makes a vector as long as it is to be, a part at a time: gigabytes of memory take the system a while.
-template <class T>
-void resize(std::vector<T>& vector, std::size_t size) {
-    constexpr std::size_t part = std::size_t{1} << 20;
-    vector.reserve(size);
-    while (vector.size() < size) {
-        Watch::checkpoint();
-        vector.resize(std::min(size, vector.size() + part));
-    }
-}
 
 }  // namespace rangeedge
