@@ -112,7 +112,7 @@ class _Page:
                     sanitize=False,
                 )
             ui.space()
-            ui.label("click a pixel: why?   wheel: zoom   double click: all").classes("text-grey-7")
+            ui.label("click: why? · wheel: zoom · double click: whole image").classes("text-grey-7")
             with ui.button("views", icon="grid_view").props("dense flat no-caps id=views"), ui.menu():
                 self.choice = {name: self._view_switch(name) for name in VIEWS}
         self.grid = ui.element("div").classes("w-full views")
@@ -122,7 +122,7 @@ class _Page:
 
     def _view_switch(self, name: str) -> ui.checkbox:
         box = ui.checkbox(f"{name}: {_CAPTIONS[name]}", value=name in _FIRST, on_change=lambda: self._lay_out())
-        return box.props("dense").classes("q-px-md q-py-xs w-full")
+        return box.props("dense").classes("q-px-md q-py-xs").style("width: 400px")
 
     def _controls(self) -> None:
         session = self.session
@@ -306,8 +306,7 @@ def _heading(text: str) -> None:
 def _explained(name: str) -> str:
     """What a parameter means, for those who point at it."""
     option = DETECTION[name]
-    text = option.text.replace("`", "") + (f" [{option.unit}]" if option.unit else "")
-    return text
+    return option.text.replace("`", "") + (f" [{option.unit}]" if option.unit else "")
 
 
 def _encoded(picture: np.ndarray) -> str:
