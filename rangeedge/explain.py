@@ -186,7 +186,8 @@ class _Case:
     """One pixel, on its way through the detector."""
 
     def __init__(self, frame: Frame, params: ScanLineParams, selection: Selection, x: int, y: int) -> None:
-        self.frame, self.params, self.selection, self.x, self.y = frame, params, selection, x, y
+        self.frame, self.params, self.selection, self.x, self.y = frame, params, selection.of(params), x, y
+        self.given = selection
         self.thin, self.strength = run_detector(frame, params, selection)
         self.edge = bool(self.thin[y, x])
         jump, crease, kind, significance = (m[y, x].item() for m in self.strength)
@@ -292,11 +293,11 @@ class _Case:
         own = {**vars(self.params), **vars(self.selection)}
         for trial in trials:
             change = {name: value for name, value in trial.items() if own[name] != value}
-            params, selection = (_with(options, change) for options in (self.params, self.selection))
+            params, selection = (_with(options, change) for options in (self.params, self.given))
             if not change:
                 continue
             strength = self.strength if params == self.params else measure_strength(self.frame, params)
-            thin = thin_lines(self.frame, selected(self.frame, strength, selection))
+            thin = thin_lines(self.frame, selected(self.frame, strength, selection.of(params)))
             if bool(thin[self.y, self.x]) != self.edge:
                 return change
         return {}

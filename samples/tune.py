@@ -117,7 +117,7 @@ def draw_curves(axes, name, curve, what):
     for figure in curve[0]:
         style, colour = STYLES[figure]
         axes.plot(places, [figures[figure] for figures in curve], style, color=colour, label=figure)
-    default = signature(rangeedge.detectEdges).parameters[name].default
+    default = signature(rangeedge.detectEdges).parameters[name].default or 20  # which None is for lineSignificance
     axes.axvline(np.interp(default, SWEEPS[name], places), color="0.4", linestyle=":")
     axes.set(title=name, xticks=places, xticklabels=[f"{value:g}" for value in SWEEPS[name]])
     axes.grid(color="0.9")

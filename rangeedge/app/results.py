@@ -96,7 +96,7 @@ def _edges_of(src: np.ndarray, mask: np.ndarray | None, params: ScanLineParams, 
     frame = measured_frame(src, params, mask)
     warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
     strength, points = measure_both(frame, params)
-    edges = selected(frame, strength, selection)
+    edges = selected(frame, strength, selection.of(params))
     thin = thin_lines(frame, edges)
     known = understood(frame, params, selection, src)
     return EdgeResults(frame, strength, points, edges, thin, around(frame, distanceTransform, thin), known)

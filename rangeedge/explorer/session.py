@@ -127,6 +127,8 @@ class Session:
     def value(self, name: str) -> Any:
         """What a parameter is."""
         value = self.options.get(name, DETECTION[name].default)
+        if value is None and name == "lineSignificance":
+            return Selection().of(self._results.params).lineSignificance
         return 0.0 if value is None else value
 
     def picture(self, view: str, results: Results | None = None) -> np.ndarray:
