@@ -215,7 +215,7 @@ class _Page:
                 self.program.content = self.session.python()
                 await run.io_bound(lambda r=results: r.edges)
                 await asyncio.gather(*(self._show(results, views, group) for group in SHARING))
-                if not self.cancellation.cancelled:
+                if not self.cancellation.cancelled and not self.status.is_deleted:
                     took, edges = 1000 * (time.perf_counter() - start), np.count_nonzero(results.edges)
                     self.status.text = f"{width} x {height}, {edges} edge pixels, {len(views)} views in {took:.0f} ms"
         except error as problem:
@@ -227,7 +227,7 @@ class _Page:
         """Those of a group of views that are shown, each as soon as it is drawn."""
         for name in (name for name in group if name in views):
             picture = await run.io_bound(self._picture, name, results)
-            if picture is None:
+            if picture is None or views[name].is_deleted:  # other views were chosen, or the page was closed
                 return
             views[name].set_source(picture)
             if self.pending:
