@@ -49,7 +49,7 @@ def show(name: str, frame: Frame, repeat: int) -> None:
     each = 1e6 * times.least("edgeStrength, noise given", one) / max(found, 1)
     floor = 4 * times.least(READING, one) / times.least(CHAIN, one)
     print(
-        f"{found} candidates, {found / frame.pixels:.1%} of the pixels: {each:.0f} ns of edgeStrength each, noise given."
+        f"{found} candidates, {found / frame.pixels:.1%} of the pixels: {each:.0f} ns of edgeStrength each, noise given"
     )
     print(f"Reading the image once in each of four directions is {floor:.1%} of {CHAIN}.")
 

@@ -23,6 +23,7 @@
 #include "base/disjoint_sets.hpp"
 #include "base/parallel.hpp"
 #include "base/simd.hpp"
+#include "regions/marks.hpp"
 
 namespace rangeedge {
 namespace {
@@ -84,18 +85,6 @@ RANGEEDGE_WIDE void mark_borders(const int* __restrict own, const int* __restric
         const int a = own[k];
         const bool alike = ((a ^ own[k + 1]) | (a ^ below[k - 1]) | (a ^ below[k]) | (a ^ below[k + 1])) == 0;
         differ[k] = !alike & is_basin(a);
-    }
-}
-
-// Calls visit(k) where a mark is set; marks are followed by eight more bytes.
-template <class F>
-void for_marked(const std::uint8_t* marks, int n, F&& visit) {
-    std::uint64_t eight;
-    for (int k = 0; k < n; k += static_cast<int>(sizeof eight)) {
-        std::memcpy(&eight, marks + k, sizeof eight);
-        if (!eight) continue;
-        for (int i = k; i < std::min(k + static_cast<int>(sizeof eight), n); ++i)
-            if (marks[i]) visit(i);
     }
 }
 
@@ -270,7 +259,7 @@ std::vector<Pass> Landscape::find_passes(const Array<float>& share) const {
                 passes.push_back(pass);
             }
         };
-        std::vector<std::uint8_t> differ(static_cast<std::size_t>(cols_) + sizeof(std::uint64_t));
+        std::vector<std::uint8_t> differ(marks_size(cols_));
         for (int row = first; row < last; ++row) {
             Watch::checkpoint();
             const int *const own = markers_ + index(row, 0), *const below = row + 1 < rows_ ? own + cols_ : own;
