@@ -42,6 +42,7 @@ public:
         distance_transform(barrier, unit, clearance_.data(), nullptr, threads);
     }
 
+    const Grid& grid() const { return grid_; }
     bool is_free(int row, int col) const { return clearance_[grid_.index(row, column(col))] > 0.0f; }
     // `col`, which may lie up to one width outside an image that wraps around, as a column.
     int column(int col) const { return col < 0 ? col + grid_.cols : col < grid_.cols ? col : col - grid_.cols; }
@@ -56,9 +57,16 @@ public:
     }
     double length(const Offset& way) const { return std::hypot(grid_.width * way.cols, grid_.height * way.rows); }
 
-    // Whether the straight line between the middles of two pixels is free.
+    // Whether a straight line between the middles of two pixels is free: where one is half the width away, either way
+    // round.
     bool in_sight(std::int32_t from, std::int32_t to) const {
         const Offset way = offset(from, to);
+        if (is_free(from, way)) return true;
+        return grid_.wrap && 2 * std::abs(way.cols) == grid_.cols && is_free(from, {way.rows, -way.cols});
+    }
+
+private:
+    bool is_free(std::int32_t from, const Offset& way) const {
         const bool steep = std::abs(way.rows) > std::abs(way.cols);
         const std::int64_t steps = steep ? std::abs(way.rows) : std::abs(way.cols);
         const std::int64_t aside = steep ? std::abs(way.cols) : std::abs(way.rows);
@@ -85,10 +93,27 @@ public:
         return true;
     }
 
-private:
     Grid grid_;
     std::vector<float> clearance_;  // pixels to the nearest barrier
 };
+
+// The nearest source where it is in sight; of several as near also one that is nearest to a neighbour. Else -1.
+std::int32_t nearest_in_sight(const Terrain& terrain, const std::vector<std::int32_t>& nearest, int row, int col) {
+    const Grid& grid = terrain.grid();
+    const auto p = static_cast<std::int32_t>(grid.index(row, col));
+    const std::int32_t source = nearest[static_cast<std::size_t>(p)];
+    if (source < 0 || terrain.in_sight(p, source)) return source;
+    const double length = terrain.length(terrain.offset(p, source));
+    for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx) {
+            const int y = row + dy, x = grid.wrap ? terrain.column(col + dx) : col + dx;
+            if (y < 0 || y >= grid.rows || x < 0 || x >= grid.cols) continue;
+            const std::int32_t other = nearest[grid.index(y, x)];
+            if (other == source || terrain.length(terrain.offset(p, other)) > length) continue;
+            if (terrain.in_sight(p, other)) return other;
+        }
+    return -1;
+}
 
 class Shadows {
 public:
@@ -178,23 +203,23 @@ void geodesic_transform(const std::uint8_t* edges, const std::uint8_t* barrier, 
     distance_transform(sources.data(), grid, distance, nearest.data(), threads);
 
     const Terrain terrain(walls.data(), grid, threads);
-    std::vector<std::uint8_t> lit(count);
+    std::vector<std::int32_t> seen(count, -1);
     Team team(std::min(threads, grid.rows));
     parallel_each(grid.rows, team, [&](int row, int) {
-        for (std::size_t p = grid.index(row, 0); p < grid.index(row + 1, 0); ++p)
-            lit[p] = !walls[p] && nearest[p] >= 0 && terrain.in_sight(static_cast<std::int32_t>(p), nearest[p]);
+        for (int col = 0; col < grid.cols; ++col)
+            if (!walls[grid.index(row, col)]) seen[grid.index(row, col)] = nearest_in_sight(terrain, nearest, row, col);
     });
+    nearest = seen;
     Shadows shadows(terrain, grid, nearest);
     Checkpoints checkpoints;
     for (std::size_t p = 0; p < count; ++p) {
         checkpoints.pass();
-        if (lit[p]) shadows.start_at(static_cast<std::int32_t>(p));
+        if (seen[p] >= 0) shadows.start_at(static_cast<std::int32_t>(p));
     }
     shadows.settle();
     for (std::size_t p = 0; p < count; ++p) {
-        const double length = shadows.length(static_cast<std::int32_t>(p));
-        if (!lit[p]) distance[p] = static_cast<float>(length);
-        if (labels) labels[p] = std::isfinite(length) ? nearest[p] : -1;
+        if (seen[p] < 0) distance[p] = static_cast<float>(shadows.length(static_cast<std::int32_t>(p)));
+        if (labels) labels[p] = nearest[p];
     }
 }
 
