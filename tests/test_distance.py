@@ -502,11 +502,11 @@ def test_mazes_of_any_pixels_against_brute_force(maze):
 
 def test_of_two_edges_as_near_the_one_in_sight_counts():
     edges, barrier = np.zeros((5, 4), np.uint8), np.zeros((5, 4), np.uint8)
-    edges[0, 3] = edges[4, 3] = 1
-    barrier[1, 1:3] = barrier[0, 1] = 1
+    edges[4, 0] = edges[4, 2] = 1
+    barrier[1, 2] = barrier[2, 0] = barrier[3, 3] = 1  # the second is in the way to the edge at the left
     distance, labels = distanceTransformWithLabels(edges, barrier=barrier)
-    assert distance[2, 1] == np.float32(np.sqrt(8))
-    assert labels[2, 1] == 4 * 4 + 3
+    assert distance[0, 1] == np.float32(np.sqrt(17))
+    assert labels[0, 1] == 4 * 4 + 2
 
 
 def test_either_way_round_is_as_good():
