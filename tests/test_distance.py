@@ -518,22 +518,6 @@ def test_either_way_round_is_as_good():
     assert distance[1, 2] == np.float32(np.sqrt(5))
 
 
-def test_time_around_barriers_does_not_grow_with_the_width():
-    """A way to and fro through corridors as long as the map is wide."""
-
-    def seconds(rows, cols):
-        edges, barrier = np.zeros((rows, cols), np.uint8), np.zeros((rows, cols), np.uint8)
-        edges[0, 0] = 1
-        barrier[7::8] = 1
-        barrier[7::16, -1] = barrier[15::16, 0] = 0
-        start = time.process_time()
-        assert np.isfinite(distanceTransform(edges, barrier=barrier)).mean() > 0.8
-        return time.process_time() - start
-
-    seconds(16, 64)
-    assert seconds(32, 4096) < 2.5 * seconds(512, 256)  # 5 and more if lines of sight may be as long as the map
-
-
 def test_barrier_by_hand():
     edges, barrier = np.zeros((5, 7), np.uint8), np.zeros((5, 7), np.uint8)
     edges[2, 1] = 1
