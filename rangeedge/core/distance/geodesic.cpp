@@ -6,7 +6,7 @@
 // 1. The distance without barriers is found first. Where the nearest edge is in sight it is the answer, exactly.
 // 2. From there on into the shadow pixels are settled in order of distance, as Dijkstra does it. A pixel hands to its
 //    eight neighbours the corner at which its own way last bent: a neighbour in sight of that goes straight to it, any
-//    other bends here (Theta*: Nash, Daniel, Koenig and Felner). So does one that is far away, since lines of sight take time.
+//    other bends here (Theta*: Nash, Daniel, Koenig and Felner). So does one far away, since lines of sight take time.
 //
 // So no result is shorter than the shortest way, and none longer than the shortest of eight-neighbour steps, which is
 // less than 8.24 % longer than any polygon where pixels are square.
