@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "base/array.hpp"
+#include "base/disjoint_sets.hpp"
 #include "base/watch.hpp"
 
 namespace rangeedge {
@@ -20,35 +21,51 @@ class RegionMap {
 public:
     RegionMap(const std::int32_t* labels, int rows, int cols, std::vector<std::int32_t>& names)
         : stride_(cols + 2), region_(static_cast<Array<std::int32_t>::Index>(rows + 2) * (cols + 2), 0) {
-        names.assign(1, 0);
-        Array<std::int32_t> label = region_;  // with the same margin
-        for (int row = 0; row < rows; ++row)
-            std::copy_n(labels + static_cast<std::ptrdiff_t>(row) * cols, cols, &label[(row + 1) * stride_ + 1]);
-        std::vector<int> open;
-        Checkpoints checkpoints;
-        for (int p = stride_; p < label.count() - stride_; ++p) {
-            if (region_[p] || label[p] <= 0) continue;
-            const auto region = static_cast<std::int32_t>(names.size());
-            region_[p] = region;
-            open.push_back(p);
-            while (!open.empty()) {
-                checkpoints.pass();
-                const int q = open.back();
-                open.pop_back();
-                for (const int step : {1, -1, stride_, -stride_})
-                    if (!region_[q + step] && label[q + step] == label[p]) {
-                        region_[q + step] = region;
-                        open.push_back(q + step);
-                    }
+        DisjointSets parts(1);  // pixels that touch above or on the left; the first represents a region
+        names.assign(1, 0);     // of parts, then of regions
+        for (int row = 0; row < rows; ++row) {
+            Watch::checkpoint();
+            const std::int32_t* label = labels + static_cast<std::ptrdiff_t>(row) * cols;
+            std::int32_t* part = &region_[static_cast<std::ptrdiff_t>(row + 1) * stride_ + 1];
+            for (int col = 0; col < cols; ++col) {
+                if (label[col] <= 0) continue;
+                const std::int32_t left = col > 0 && label[col - 1] == label[col] ? part[col - 1] : 0;
+                const std::int32_t above = row > 0 && label[col - cols] == label[col] ? part[col - stride_] : 0;
+                part[col] = left ? left : above;
+                if (!part[col]) {
+                    part[col] = parts.add();
+                    names.push_back(label[col]);
+                } else if (left && above && left != above) {
+                    const int i = parts.find(left), j = parts.find(above);
+                    parts.link(std::max(i, j), std::min(i, j));
+                }
             }
-            names.push_back(label[p]);
         }
+        std::vector<std::int32_t> number(names.size(), 0);
+        std::size_t count = 1;
+        for (std::size_t part = 1; part < number.size(); ++part) {
+            const int root = parts.find(static_cast<int>(part));
+            if (root == static_cast<int>(part)) {
+                number[part] = static_cast<std::int32_t>(count);
+                names[count++] = names[part];
+            } else {
+                number[part] = number[static_cast<std::size_t>(root)];
+            }
+        }
+        names.resize(count);
+        for (std::int32_t& region : region_) region = number[static_cast<std::size_t>(region)];
     }
 
     // The region of the pixel behind a corner on the right of one who leaves it that way, and on the left.
     std::int32_t right_of(int x, int y, int way) const { return at(x - (way == 1 || way == 2), y - (way >= 2)); }
     std::int32_t left_of(int x, int y, int way) const { return at(x - (way >= 2), y - (way == 0 || way == 3)); }
     bool border(int x, int y, int way) const { return right_of(x, y, way) != left_of(x, y, way); }
+    // Whether all four pixels around a corner are of one region.
+    bool amid(int x, int y) const {
+        const std::int32_t* above = &region_[static_cast<std::ptrdiff_t>(y) * stride_ + x];
+        const std::int32_t* below = above + stride_;
+        return above[0] == above[1] && above[0] == below[0] && above[0] == below[1];
+    }
 
 private:
     std::int32_t at(int col, int row) const { return region_[(row + 1) * stride_ + col + 1]; }
@@ -64,23 +81,27 @@ public:
           done_(static_cast<Array<std::uint8_t>::Index>(rows + 1) * (cols + 1), 0) {}
 
     Outlines trace() {
-        for_corners([&](int x, int y) {
+        std::vector<std::array<int, 2>> corners;
+        for (int y = 0; y <= rows_; ++y) {
+            Watch::checkpoint();
+            for (int x = 0; x <= cols_; ++x)
+                if (!map_.amid(x, y)) corners.push_back({x, y});
+        }
+        Checkpoints checkpoints;
+        for (const auto& [x, y] : corners) {
+            checkpoints.pass();
             if (ways_from(x, y) > 2)
                 for (int way = 0; way < 4; ++way) follow(x, y, way);
-        });
-        for_corners([&](int x, int y) { follow(x, y, 0); });  // what is left has no end; it goes east somewhere
+        }
+        for (const auto& [x, y] : corners) {  // what is left has no end; it goes east somewhere
+            checkpoints.pass();
+            follow(x, y, 0);
+        }
         link();
         return std::move(found_);
     }
 
 private:
-    template <class F>
-    void for_corners(F&& visit) const {
-        for (int y = 0; y <= rows_; ++y) {
-            Watch::checkpoint();
-            for (int x = 0; x <= cols_; ++x) visit(x, y);
-        }
-    }
     bool inside(int x, int y) const { return x >= 0 && y >= 0 && x <= cols_ && y <= rows_; }
     bool open(int x, int y, int way) const {
         const auto k = static_cast<std::size_t>(way);
