@@ -9,6 +9,7 @@
 #include "base/array.hpp"
 #include "base/disjoint_sets.hpp"
 #include "base/watch.hpp"
+#include "regions/crossings.hpp"
 
 namespace rangeedge {
 namespace {
@@ -224,36 +225,65 @@ double squared_distance(const double* p, const double* a, const double* b) {
     return (u - along * x) * (u - along * x) + (v - along * y) * (v - along * y);
 }
 
+// Of the points between two, the one farthest from the line through these; the first of them if all lie on it.
+struct Farthest {
+    std::int64_t index;
+    double square;  // of its distance
+};
+Farthest farthest(const double* points, std::int64_t first, std::int64_t last) {
+    Farthest worst{first + 1, 0};
+    for (std::int64_t k = first + 1; k < last; ++k) {
+        const double d = squared_distance(points + 2 * k, points + 2 * first, points + 2 * last);
+        if (d > worst.square) worst = {k, d};
+    }
+    return worst;
+}
+
+void simplify(const double* points, const Polyline& line, std::uint8_t* kept) {
+    const std::int64_t end = line.first + line.count - 1;
+    const double *const first = points + 2 * line.first, *const last = points + 2 * end;
+    kept[line.first] = kept[end] = 1;
+    std::vector<std::array<std::int64_t, 2>> open{{line.first, end}};
+    int needed = first[0] == last[0] && first[1] == last[1] ? 3 : 0;
+    Checkpoints checkpoints;
+    while (!open.empty()) {
+        const auto [a, b] = open.back();
+        open.pop_back();
+        checkpoints.pass();
+        const Farthest worst = farthest(points, a, b);
+        if (worst.square == 0 || (worst.square <= line.tolerance * line.tolerance && needed <= 0)) continue;
+        --needed;
+        kept[worst.index] = 1;
+        open.push_back({a, worst.index});
+        open.push_back({worst.index, b});
+    }
+}
+
 }  // namespace
 
 Outlines trace_outlines(const std::int32_t* labels, int rows, int cols) { return Tracer(labels, rows, cols).trace(); }
 
 void simplify_lines(const double* points, const std::vector<Polyline>& lines, std::uint8_t* kept) {
-    std::vector<std::pair<std::int64_t, std::int64_t>> open;
-    Checkpoints checkpoints;
-    for (const Polyline& line : lines) {
-        checkpoints.pass();
-        const std::int64_t end = line.first + line.count - 1;
-        const double *const first = points + 2 * line.first, *const last = points + 2 * end;
-        kept[line.first] = kept[end] = 1;
-        open.assign(1, {line.first, end});
-        int needed = first[0] == last[0] && first[1] == last[1] ? 3 : 0;
-        while (!open.empty()) {
-            const auto [a, b] = open.back();
-            open.pop_back();
-            checkpoints.pass();
-            double most = 0;
-            std::int64_t worst = a;
-            for (std::int64_t k = a + 1; k < b; ++k) {
-                const double d = squared_distance(points + 2 * k, points + 2 * a, points + 2 * b);
-                if (d > most) most = d, worst = k;
+    for (const Polyline& line : lines) simplify(points, line, kept);
+    // Whatever gets in the way of something else comes a step closer to what it replaces, which does not.
+    for (bool changed = true; changed;) {
+        std::vector<PlaneSegment> segments;
+        std::vector<std::array<std::int64_t, 2>> ends;
+        for (const Polyline& line : lines)
+            for (std::int64_t k = line.first + 1, before = line.first; k < line.first + line.count; ++k) {
+                if (!kept[k]) continue;
+                const double *const from = points + 2 * before, *const to = points + 2 * k;
+                segments.push_back({{from[0], from[1]}, {to[0], to[1]}});
+                ends.push_back({before, k});
+                before = k;
             }
-            if (worst == a || (most <= line.tolerance * line.tolerance && needed <= 0)) continue;
-            --needed;
-            kept[worst] = 1;
-            open.emplace_back(a, worst);
-            open.emplace_back(worst, b);
-        }
+        const std::vector<std::uint8_t> crossing = find_crossings(segments);
+        changed = false;
+        for (std::size_t i = 0; i < ends.size(); ++i)
+            if (crossing[i] && ends[i][1] > ends[i][0] + 1) {
+                kept[farthest(points, ends[i][0], ends[i][1]).index] = 1;
+                changed = true;
+            }
     }
 }
 
