@@ -251,8 +251,7 @@ def _on_lines(vertices: np.ndarray, counts: np.ndarray, beside: np.ndarray, surf
     ends = np.cumsum(counts)
     end[ends - counts] = end[ends - 1] = True
     moved = np.where((near & ~end)[:, None], vertices - off[:, None] * n, vertices)
-    places, corner = np.unique(vertices[end], axis=0, return_inverse=True)
-    corner = corner.ravel()
+    places, corner = _distinct(vertices[end])
     pull, toward = np.tile(_STIFFNESS * np.eye(2), (len(places), 1, 1)), _STIFFNESS * places
     own, n, c = near[end], n[end], offset[arc][end]
     np.add.at(pull, corner[own], n[own, :, None] * n[own, None, :])
@@ -264,15 +263,23 @@ def _on_lines(vertices: np.ndarray, counts: np.ndarray, beside: np.ndarray, surf
     return moved
 
 
+def _distinct(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The different ones of (N, 2) vertices, and which of these each is."""
+    different, number = np.unique(vertices @ (1, 1j), return_inverse=True)
+    return np.stack([different.real, different.imag], axis=1), number.ravel()
+
+
 def _untangled(moved: np.ndarray, vertices: np.ndarray, counts: np.ndarray) -> np.ndarray:
     """Moved vertices, of which those of arcs that cross are where they were, as far as it takes."""
+    place = None
     while True:
         crossing = np.zeros(len(moved), np.uint8)
         _core.find_crossings(np.ascontiguousarray(moved), counts, crossing)
         if not crossing.any():
             return moved
-        _, place = np.unique(vertices, axis=0, return_inverse=True)  # arcs that meet move together
-        place, start = place.ravel(), np.flatnonzero(crossing)
+        if place is None:
+            _, place = _distinct(vertices)  # arcs that meet move together
+        start = np.flatnonzero(crossing)
         back = np.zeros(len(moved), bool)
         back[place[start]] = back[place[start + 1]] = True
         back = back[place] & (moved != vertices).any(axis=1)
