@@ -265,7 +265,7 @@ def _on_lines(vertices: np.ndarray, counts: np.ndarray, beside: np.ndarray, surf
 
 def _distinct(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The different ones of (N, 2) vertices, and which of these each is."""
-    different, number = np.unique(vertices @ (1, 1j), return_inverse=True)
+    different, number = np.unique(vertices[:, 0] + 1j * vertices[:, 1], return_inverse=True)
     return np.stack([different.real, different.imag], axis=1), number.ravel()
 
 
