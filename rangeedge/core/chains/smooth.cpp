@@ -231,25 +231,17 @@ private:
         return s.candidate->sides[(side == 0) != s.before_left];
     }
 
-    double ordinate_at(std::int32_t pixel) const {
-        if (frame_.ordinate) return static_cast<double>(frame_.ordinate[pixel]);
-        double along = 0;
-        for (int i = 0; i < 3; ++i)
-            along += static_cast<double>(frame_.points[3 * std::ptrdiff_t{pixel} + i]) * frame_.axis[i];
-        return frame_.projective ? 1 / along : -along;
-    }
-
     // The share of a length on the line of sight that lies along the axis, where jumps are measured on that.
     double along_axis(std::int32_t pixel) const {
         if (!frame_.ranges) return 1;
-        return 1 / (std::abs(ordinate_at(pixel)) * length(frame_.point(pixel)));
+        return 1 / (std::abs(ordinate_at(frame_, pixel)) * length(frame_.point(pixel)));
     }
 
     // Of a surface beside an edge, moved along the scan line to where the candidate was moved.
     double ordinate(const ChainSample& s, int side) const {
         const Candidate& c = *s.candidate;
         if (!has_sides(c)) {
-            const double near = ordinate_at(c.kind & occluding_bit ? c.before : c.after),
+            const double near = ordinate_at(frame_, c.kind & occluding_bit ? c.before : c.after),
                          jump = static_cast<double>(c.jump) * along_axis(c.before);
             if (side == 0) return near;
             return frame_.projective ? 1 / (1 / near + jump) : near - jump;
