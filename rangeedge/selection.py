@@ -14,7 +14,7 @@ from ._option import takes
 from .constants import EDGE_BOUNDARY, EDGE_OCCLUDING
 from .dynamic import outstanding
 from .edges import EdgeStrength
-from .options import SELECTION, Selection
+from .options import LINE_SIGNIFICANCE, SELECTION, Selection
 from .pixels import beside, components, pixels_of
 
 if TYPE_CHECKING:
@@ -180,6 +180,8 @@ def selectEdges(*args: Any, **options: Any) -> np.ndarray:
     minLength : int
         Least length of an 8-connected component in pixels, >= 1; by default 5 for `strength`, else 1. The length is
         the longer side of the bounding box: the number of pixels of a straight line, however thick.
+    lineSignificance : float or None
+        Least significance of a line of `strength`, as in `detectEdges`; None is 20, whatever made the strengths.
     dynamic : bool
         Whether to apply the dynamic threshold. It needs a map whose candidates are mostly noise, so pass
         strengths found with ``minSignificance=0`` and low thresholds.
@@ -298,8 +300,9 @@ def select_maps(
     if hysteresis < 1:
         low = (hysteresis * thresholds[0], hysteresis * thresholds[1])
         edges = _connected_to(edges, _reaching(jump, crease, low), wrap)
-    if selection.minLength > 1 or (significance is not None and selection.lineSignificance > 0):
-        edges = _lines(edges, selection.minLength, significance, selection.lineSignificance, wrap)
+    least = LINE_SIGNIFICANCE if selection.lineSignificance is None else selection.lineSignificance
+    if selection.minLength > 1 or (significance is not None and least > 0):
+        edges = _lines(edges, selection.minLength, significance, least, wrap)
     if selection.dynamic:
         edges &= outstanding(jump, wrap) | outstanding(crease, wrap)
     return edges.view(np.uint8) * np.uint8(255)

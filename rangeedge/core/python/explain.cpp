@@ -14,7 +14,8 @@ nb::tuple kept_and_weak(const BoundFrame& bound, const ScanLineOptions& options,
     std::vector<Candidate> kept, weak;
     {
         const Unlock unlock;
-        std::visit([&](const auto& frame) { kept = find_candidates(frame, options, threads, nullptr, &weak); },
+        Team team = team_for(bound, threads);
+        std::visit([&](const auto& frame) { kept = find_candidates(frame, options, team, nullptr, &weak); },
                    bound.frame);
     }
     return nb::make_tuple(columns(kept), columns(weak));
