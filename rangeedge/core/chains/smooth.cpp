@@ -48,6 +48,7 @@ public:
     SmoothChain smooth() {
         if (places() < 2) return {};
         result_.points.resize(static_cast<std::size_t>(places()));
+        for (ChainPoint& p : result_.points) p.deviation = nan;
         find_positions();
         find_plane();
         for (const int side : {0, 1}) find_ordinates(side);
@@ -112,11 +113,13 @@ private:
         }
         if (!fit.fits) return false;
         result_.straight = true;
-        if (jumps_) separate(pixel_pairs(line), fit);
+        LineSpread spread;
+        const bool bounded = jumps_ && separate(pixel_pairs(line), fit, spread);
         positions_.resize(places());
         for (std::ptrdiff_t k = 0; k < places(); ++k) {
             const double t = line.along(means_[k].x, means_[k].y), off = fit.at(t);
             positions_[k] = t;
+            if (bounded) point(k).deviation = spread.deviation_at(t);
             point(k).x = line.x + t * line.dx - off * line.dy;
             point(k).y = line.y + t * line.dy + off * line.dx;
         }
@@ -325,6 +328,9 @@ private:
             ChainPoint& p = point(k);
             for (double& v : p.measured) v = counts[k] ? v / counts[k] : nan;
             if (!frame_.points && counts[k]) to_plane(means_[k].x, means_[k].y, p.measured);
+            const double* gradient = p.gradient[0];
+            if (gradients_known_ && std::isfinite(gradient[0]))
+                for (const int axis : {0, 1}) p.measured[2] += (p.measured[axis] - p.plane[axis]) * gradient[axis];
         }
     }
 
