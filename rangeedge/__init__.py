@@ -22,7 +22,7 @@ edges               detectEdges, detectEdgesWithStrength, createScanLineDetector
 why                 explainPixel, drawExplanation
 strengths           edgeStrength, edgePoints, kindNames, splitScanLine, strengthImage, overallStrength
 select and thin     selectEdges, thinEdges, closeContours
-lines in space      linkEdges, fitSegments, writeLines
+lines in space      linkEdges, fitSegments, fitArcs, writeLines
 distances           distanceTransform, salienceDistanceTransform, ...WithLabels
 seeds, surfaces     extractSeeds, growRegions, segmentRegions, ...WithStats, regionAdjacency
 pictures (BGR)      drawEdges, drawRegions, drawChains, drawSegments, colorizeDistance, drawOverview, drawPanels
@@ -39,6 +39,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._check import error
 from .adjacency import regionAdjacency, regionCorners
+from .arcs import fitArcs
 from .boundaries import RegionBoundaries, RegionBoundary, regionBoundaries
 from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
@@ -81,6 +82,7 @@ from .distance import (
 )
 from .draw import (
     colorizeDistance,
+    drawArcs,
     drawBoundaries,
     drawChains,
     drawEdges,
@@ -153,6 +155,7 @@ __all__ = [  # noqa: RUF022
     "linkEdges",
     "Segments",
     "fitSegments",
+    "fitArcs",
     "Line",
     "toLines",
     "writeLines",
@@ -177,6 +180,7 @@ __all__ = [  # noqa: RUF022
     "drawEdges",
     "drawChains",
     "drawSegments",
+    "drawArcs",
     "drawRegions",
     "drawBoundaries",
     "colorizeDistance",

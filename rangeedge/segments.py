@@ -171,14 +171,14 @@ def _segment(chain: EdgeChain, points: np.ndarray, number: int) -> tuple:
     measured = points["measured"] - centre
     across = measured - np.outer(measured @ direction, direction)
     across = across[np.isfinite(across).all(axis=1)]
-    rms = _scatter(across)[0]
-    share = _COMMON_OF_JUMPS if chain.kind == EDGE_JUMP else _COMMON_OF_CREASES
+    rms = scatter(across)[0]
+    share = common_share(chain.kind)
     aside = 0.0
     normal = _unit(points["normals"][:, 0].mean(axis=0))  # of the nearer surface
     if np.isfinite(normal).all() and (points["deviation"] > 0).all():  # where it runs pixels tell, of its depth noise
         across, share = across @ normal[:, None], _COMMON_OF_CREASES
         aside = _length_aside(points, normal, pixels, direction, length) * _rms(points["deviation"][[0, -1]])
-    noise, independent = _scatter(across)
+    noise, independent = scatter(across)
     centre_deviation = noise / np.sqrt(independent)
     common = np.hypot(np.hypot(share * noise, _FINEST * length), aside)
     slope_deviation = np.hypot(np.sqrt(12) * centre_deviation, common) / length if length > 0 else np.pi
@@ -220,7 +220,12 @@ def _rms(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _scatter(across: np.ndarray) -> tuple[float, float]:
+def common_share(kind: int) -> float:
+    """The share of their scatter that all points of a chain have in common."""
+    return _COMMON_OF_JUMPS if kind == EDGE_JUMP else _COMMON_OF_CREASES
+
+
+def scatter(across: np.ndarray) -> tuple[float, float]:
     """Root mean square of offsets without those that lie far off, and as how many independent ones they count."""
     if len(across) < 3:
         return 0.0, 1.0

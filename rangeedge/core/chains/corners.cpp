@@ -233,6 +233,7 @@ private:
     }
 
     void complete(std::ptrdiff_t first, std::ptrdiff_t last) {
+        if (view_ == View::side && last - first > 2 * longest_arm) return;  // depths around a curve turn, too
         window_.clear();
         for (std::ptrdiff_t k = first; k <= last; ++k) window_.push_back(at(k));
         const int split = best_split(), n = static_cast<int>(window_.size());

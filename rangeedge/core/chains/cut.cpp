@@ -33,7 +33,12 @@ public:
     void cut(std::vector<Piece>& parts) {
         if (points_.size() < least_points) return;
         // Ends of parts, as numbers of points; around a closed chain they go on from the last point to the first.
-        const Array<std::ptrdiff_t> corners = find_corners(points_, chain_.closed, least_angle_, View::image);
+        Array<std::ptrdiff_t> corners = find_corners(points_, chain_.closed, least_angle_, View::image);
+        // A closed chain without any is opened at either of two places, to find a first one.
+        for (std::ptrdiff_t start = 0; chain_.closed && corners.empty() && start < size(); start += size() / 2 + 1) {
+            const Array<std::ptrdiff_t> in_space = corners_in_space(start, start + size());
+            if (!in_space.empty()) corners.push_back(in_space[0] % size());
+        }
         Array<std::ptrdiff_t> ends;
         if (!chain_.closed) ends.push_back(0);
         for (const std::ptrdiff_t corner : corners) ends.push_back(corner);
@@ -41,9 +46,7 @@ public:
         Array<std::ptrdiff_t> all;
         for (std::ptrdiff_t i = 0; i + 1 < ends.size(); ++i) {
             all.push_back(ends[i]);
-            side_view(ends[i], ends[i + 1]);
-            for (const std::ptrdiff_t corner : find_corners(medians(), false, least_angle_, View::side))
-                all.push_back(ends[i] + median_reach + corner);
+            for (const std::ptrdiff_t corner : corners_in_space(ends[i], ends[i + 1])) all.push_back(corner);
         }
         if (all.empty() || (!chain_.closed && all.size() == 1)) {
             parts.push_back(std::move(chain_));
@@ -61,6 +64,14 @@ private:
         const std::ptrdiff_t n = chain_.members.size();
         if (!chain_.closed && (i == 0 || i == size())) return i ? n : 0;
         return members_[i % size()] + (i >= size() ? n : 0);
+    }
+
+    // Numbers of points from one to before another.
+    Array<std::ptrdiff_t> corners_in_space(std::ptrdiff_t first, std::ptrdiff_t end) {
+        side_view(first, end);
+        Array<std::ptrdiff_t> found = find_corners(medians(), false, least_angle_, View::side);
+        for (std::ptrdiff_t& corner : found) corner += first + median_reach;
+        return found;
     }
 
     // The positions along the chain from one point to before another, and the depths there, both in pixels.
