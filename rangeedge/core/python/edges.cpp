@@ -1,5 +1,9 @@
 // Scan lines and edges.
 // SPDX-License-Identifier: Apache-2.0
+#include <nanobind/stl/array.h>
+
+#include <array>
+
 #include "base/simd.hpp"
 #include "edges/combine.hpp"
 #include "edges/detect.hpp"
@@ -77,6 +81,14 @@ void flying_pixels(const BoundFrame& bound, const ScanLineOptions& options, int 
     std::visit([&](const auto& frame) { find_candidates(frame, options, team, flying.data()); }, bound.frame);
 }
 
+void bound_select_pixels(const Image<float>& jump, const Image<float>& crease, const Image<std::uint8_t>& kind,
+                         const std::array<double, 3>& thresholds, bool wrap, int threads,
+                         const OutImage<std::uint8_t>& edges) {
+    Team team(threads);
+    const rangeedge::Strengths strengths{jump.data(), crease.data(), kind.data(), rows(jump), cols(jump), wrap};
+    select_pixels(strengths, {thresholds[0], thresholds[1], thresholds[2]}, team, edges.data());
+}
+
 void bound_keep_lines(const Image<std::uint8_t>& edges, bool wrap, int min_length, const Image<float>& significance,
                       double least_significance, const OutImage<std::uint8_t>& kept) {
     keep_lines(edges.data(), rows(edges), cols(edges), wrap, min_length, significance.data(), least_significance,
@@ -108,6 +120,8 @@ void bind_edges(nb::module_& m) {
     m.def("flying_pixels", &flying_pixels, "frame"_a, "options"_a, "threads"_a, array("flying"), Unlocked());
     m.def("thin_lines", &thin_to_lines, array("edges"), optional_array("preferred"), "spur_length"_a, array("thin"),
           Unlocked());
+    m.def("select_pixels", &bound_select_pixels, array("jump"), array("crease"), optional_array("kind"), "thresholds"_a,
+          "wrap"_a, "threads"_a, array("edges"), Unlocked());
     m.def("keep_lines", &bound_keep_lines, array("edges"), "wrap"_a, "min_length"_a, optional_array("significance"),
           "least_significance"_a, array("kept"), Unlocked());
 }
