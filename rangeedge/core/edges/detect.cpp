@@ -140,7 +140,6 @@ private:
         const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_position(line, g, x);
         double jump = edge.intersects ? 0 : jump_strength(line, x, f1, f2);
         if (jump > 0) jump = std::min(jump, largest_jump(line, edge.before, edge.after));
-        double crease = crease_strength(f1, f2);
 
         const int n1 = a.segments[i].size(), n2 = a.segments[j].size();
         const FitNoise& noise = *line.noise;
@@ -151,18 +150,23 @@ private:
                                                     value_deviation(noise, sigma2, n2, f2.value_variance));
         const FitDeviation of_crease = crease_deviation(f1, slope1, f2, slope2);
         const double difference = std::abs(f1.ordinate - f2.ordinate);
-        double jump_significance = difference / of_jump.shared, crease_significance = crease / of_crease.shared;
-        const double seen_jump = jump, seen_crease = crease;
+        double jump_significance = difference / of_jump.shared;
+        const double seen_jump = jump;
         const double least = std::min(lone_significance, options_.min_significance);
         if (!std::isfinite(jump) || !(difference >= least * of_jump.single)) jump = jump_significance = 0;
-        if (!std::isfinite(crease) || !(crease >= least * of_crease.single)) crease = crease_significance = 0;
         bool jumps = jump > 0 && is_jump(line, edge.before, edge.after, difference, difference / of_jump.single);
         const bool smooth = jumps && is_smooth(line, edge.before, edge.after, steps, difference);
         if (smooth) jump = jump_significance = 0, jumps = false;
         const double step = (line.abscissa(edge.after) - line.abscissa(edge.before)) / (edge.after - edge.before);
         const bool bends = bends_smoothly(line, edge.before, edge.after, std::abs(f1.slope - f2.slope) * step);
-        if (jumps || bends) crease = crease_significance = 0;
+        double crease = 0, crease_significance = 0;
+        if (!jumps && !bends && may_exceed(f1, f2, least * of_crease.single)) {
+            crease = crease_strength(f1, f2);
+            if (!std::isfinite(crease) || !(crease >= least * of_crease.single)) crease = 0;
+            crease_significance = crease / of_crease.shared;
+        }
         if (trace_) {
+            const double seen_crease = crease_strength(f1, f2);
             CutTrace t{};
             t.cut = edge.sample - edge.shift, t.sample = edge.sample;
             t.before = edge.before, t.after = edge.after, t.jump = seen_jump, t.crease = seen_crease;
