@@ -269,18 +269,18 @@ void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, T
 }
 
 // All candidates by their place in the image, numbered by direction, then by line, then along the line.
-std::vector<Candidate> sorted(std::vector<Part>& parts, int rows, int cols, Team& team) {
+std::vector<Candidate> sorted(const std::vector<Part>& parts, int rows, int cols, Team& team) {
     std::vector<const Candidate*> found;
-    for (Part& part : parts)
-        for (Candidate& c : part.found.candidates) {
-            c.order = static_cast<std::int32_t>(found.size());
-            found.push_back(&c);
-        }
+    for (const Part& part : parts)
+        for (const Candidate& c : part.found.candidates) found.push_back(&c);
     const auto at = [&](int i) -> const Candidate& { return *found[static_cast<std::size_t>(i)]; };
     std::vector<Candidate> candidates(found.size());
     Cells cells(rows, cols);
-    cells.sort(static_cast<int>(found.size()), at, team,
-               [&](std::int32_t i, int k) { candidates[static_cast<std::size_t>(k)] = at(i); });
+    cells.sort(static_cast<int>(found.size()), at, team, [&](std::int32_t i, int k) {
+        Candidate& c = candidates[static_cast<std::size_t>(k)];
+        c = at(i);
+        c.order = i;
+    });
     return candidates;
 }
 

@@ -5,7 +5,6 @@
 #include <array>
 
 #include "base/simd.hpp"
-#include "edges/combine.hpp"
 #include "edges/detect.hpp"
 #include "edges/select.hpp"
 #include "edges/thin.hpp"
@@ -60,7 +59,7 @@ std::vector<Candidate> fill(const BoundFrame& bound, const ScanLineOptions& opti
 
 void edge_strength(const BoundFrame& frame, const ScanLineOptions& options, int threads, const Strengths& jump,
                    const Strengths& crease, const OutImage<std::uint8_t>& kind, const Strengths& significance) {
-    fill(frame, options, threads, {jump.data(), crease.data(), kind.data(), significance.data()});
+    fill(frame, options, threads, maps_of(jump, crease, kind, significance));
 }
 
 Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads,
@@ -69,7 +68,7 @@ Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOpti
     std::vector<Candidate> candidates;
     {
         const Unlock unlock;
-        candidates = fill(frame, options, threads, {jump.data(), crease.data(), kind.data(), significance.data()});
+        candidates = fill(frame, options, threads, maps_of(jump, crease, kind, significance));
         put_in_order(candidates);
     }
     return columns(candidates);
