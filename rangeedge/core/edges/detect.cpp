@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "base/parallel.hpp"
-#include "edges/cells.hpp"
 #include "edges/neighbours.hpp"
 #include "edges/position.hpp"
 #include "edges/shadow.hpp"
@@ -268,22 +267,6 @@ void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, T
     if (smeared) mask.write(smeared);
 }
 
-// All candidates by their place in the image, numbered by direction, then by line, then along the line.
-std::vector<Candidate> sorted(const std::vector<Part>& parts, int rows, int cols, Team& team) {
-    std::vector<const Candidate*> found;
-    for (const Part& part : parts)
-        for (const Candidate& c : part.found.candidates) found.push_back(&c);
-    const auto at = [&](int i) -> const Candidate& { return *found[static_cast<std::size_t>(i)]; };
-    std::vector<Candidate> candidates(found.size());
-    Cells cells(rows, cols);
-    cells.sort(static_cast<int>(found.size()), at, team, [&](std::int32_t i, int k) {
-        Candidate& c = candidates[static_cast<std::size_t>(k)];
-        c = at(i);
-        c.order = i;
-    });
-    return candidates;
-}
-
 }  // namespace
 
 template <class T>
@@ -307,9 +290,13 @@ std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOpti
         }
     });
     clear_smear(parts, frame.rows, frame.cols, options.directions, team, smeared);
-    std::vector<Candidate> candidates = sorted(parts, frame.rows, frame.cols, team);
+    std::vector<const Candidate*> found;
+    for (const Part& part : parts)
+        for (const Candidate& c : part.found.candidates) found.push_back(&c);
+    NeighbourGrid grid(frame.rows, frame.cols, team);
+    std::vector<Candidate> candidates = in_place(found, grid);
     parts.clear();
-    join_neighbours(candidates, frame, options, team, weak);
+    join_neighbours(candidates, grid, frame, options, weak);
     return candidates;
 }
 
