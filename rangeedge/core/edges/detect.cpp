@@ -157,7 +157,8 @@ private:
         const bool smooth = jumps && is_smooth(line, edge.before, edge.after, steps, difference);
         if (smooth) jump = jump_significance = 0, jumps = false;
         const double step = (line.abscissa(edge.after) - line.abscissa(edge.before)) / (edge.after - edge.before);
-        const bool bends = bends_smoothly(line, edge.before, edge.after, std::abs(f1.slope - f2.slope) * step);
+        const double bend = std::abs(f1.slope - f2.slope) * step;
+        const bool bends = (!jumps || trace_) && bends_smoothly(line, edge.before, edge.after, bend);
         double crease = 0, crease_significance = 0;
         if (!jumps && !bends && may_exceed(f1, f2, least * of_crease.single)) {
             crease = crease_strength(f1, f2);
@@ -179,6 +180,7 @@ private:
         }
 
         Candidate c{};
+        if (!(jump > 0 || crease > 0)) return c;
         c.jump = within_range(jump);
         c.crease = static_cast<float>(crease);
         // A jump that is none by itself says nothing of a crease.
@@ -188,7 +190,6 @@ private:
             c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
         if (crease > 0) c.kind |= is_convex(f1, f2) ? convex_bit : concave_bit;
         locate(c, line, edge);
-        const double bend = std::abs(f1.slope - f2.slope) * step;
         c.spread = within_range(of_jump.single / bend);
         c.sides[0] = side(line, x, f1, slope1.single);
         c.sides[1] = side(line, x, f2, slope2.single);
