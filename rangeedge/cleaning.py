@@ -14,6 +14,7 @@ from ._option import parsed, takes
 from .constants import CLEAN_FILLED, CLEAN_REMOVED, CLEAN_SMOOTHED
 from .detector import selected, thin_lines
 from .edges import kernel_options, no_strength
+from .flying import keep_limbs
 from .forms import range_array
 from .frame import Frame
 from .noise import measured_frame
@@ -152,6 +153,7 @@ def _edges_and_flying(frame: Frame, params: ScanLineParams, flying: np.ndarray) 
     """The edges, thin, and in `flying` 255 where pixels fly: both by one approximation of the scan lines."""
     strength = no_strength(frame.shape)
     _core.edge_strength_and_flying(frame.kernel, kernel_options(frame, params), frame.threads, *strength, flying)
+    keep_limbs(frame, params, flying)
     return thin_lines(frame, selected(frame, strength, Selection()))
 
 

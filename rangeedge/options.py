@@ -61,6 +61,9 @@ def _noise(name: str, value: Any) -> NoiseModel | float | np.ndarray:
     if isinstance(value, NoiseModel):
         return value
     if not isinstance(value, np.ndarray):
+        if isinstance(value, str) or callable(value):
+            model = "a NoiseModel, such as NoiseModel.kinect1()"
+            raise _check.fail(name, f"a number, {model}, or a real array of shape (H, W)", _check.described(value))
         return _check.number(name, value, 0, above=True)
     expected = "a number, a NoiseModel, or a real array of shape (H, W)"
     value = _check.array(name, value, expected)

@@ -95,8 +95,9 @@ def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
         count = np.count_nonzero(src == value)
         if count >= _SEVERAL:
             warn(
-                f"`src` is {value:g} at {count} of {src.size} pixels, far from all others: say invalid={value:g} if"
-                " these have no data, invalid=() if they have"
+                f"{count} of {src.size} pixels of `src` are exactly {value:g}, far from the others (about"
+                f" {others.min():g} to {others.max():g}), as if that stood for no data: say invalid={value:g} if it"
+                " does, invalid=() if it was measured"
             )
 
 

@@ -70,6 +70,32 @@ def test_exports_make_the_same_edges(session, tmp_path, monkeypatch):
     assert detector.getCreaseThreshold() == 20
 
 
+def test_what_a_parameter_leaves_as_it_was_is_kept(session):
+    strength = session.results.strength
+    session.change("creaseThreshold", 50.0)
+    assert session.results.strength is strength
+    expected = rangeedge.detectEdges(session.image.src, **session.geometry, creaseThreshold=50)
+    assert np.array_equal(session.results.edges, expected)
+    session.change("epsFactor", 5.0)
+    assert session.results.strength is not strength
+
+
+def test_everyone_has_a_session_of_their_own(session):
+    session.change("maxGap", 3)
+    other = session.copy()
+    other.change("maxGap", 20)
+    assert (session.value("maxGap"), other.value("maxGap")) == (3, 20)
+
+
+def test_missing_camera_is_noted(session):
+    assert session.notes == []
+    session.place("", "", height_map=False)
+    assert len(session.notes) == 1
+    assert "give K" in session.notes[0]
+    session.place("525, 525, 319.5, 239.5", "", height_map=False)
+    assert session.notes == []
+
+
 def test_wrong_uploads_change_nothing(session):
     before = session.picture("edges")
     colour = cv2.imencode(".png", np.zeros((20, 30, 3), np.uint8))[1].tobytes()
@@ -179,7 +205,7 @@ def test_page(page, tmp_path):
     assert first.startswith("640 x 480, ")
     views = driver.find_elements("css selector", ".view img")
     assert len(views) == 4
-    assert all(view.get_attribute("src").startswith("data:image/png") for view in views)
+    assert all(view.get_attribute("src").startswith("data:image/jpeg") for view in views)
 
     # A slider changes the edges, the program that the page shows, and nothing else.
     slider = driver.find_element("id", "creaseThreshold")
@@ -202,7 +228,16 @@ def test_page(page, tmp_path):
     ActionChains(driver).send_keys(Keys.ESCAPE).perform()
     _wait(lambda: not driver.find_elements("css selector", ".q-dialog__backdrop"))
 
+    # The menu chooses views.
+    driver.find_element("id", "views").click()
+    _wait(lambda: [box for box in driver.find_elements("css selector", ".q-menu .q-checkbox") if box.is_displayed()])
+    status = page.after(driver.find_elements("css selector", ".q-menu .q-checkbox")[2].click)
+    assert "5 views" in status
+    ActionChains(driver).send_keys(Keys.ESCAPE).perform()
+    _wait(lambda: not driver.find_elements("css selector", ".q-menu"))
+
     # The wheel zooms all views together.
+    image = driver.find_element("css selector", "#view-edges img, #view-edges")
     ActionChains(driver).scroll_from_origin(_origin(image), 0, -300).perform()
     zoom = "return getComputedStyle(document.documentElement).getPropertyValue('--zoom')"
     _wait(lambda: float(driver.execute_script(zoom) or 1) > 1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -14,20 +15,22 @@ import numpy as np
 
 from .._check import described, error
 from .._option import parsed
-from ..chains import linkEdges
+from ..chains import link_frame
 from ..constants import SALIENCE_ADDITIVE
-from ..detector import createScanLineDetector, run_detector
+from ..detector import createScanLineDetector, selected, thin_lines
 from ..distance import distanceTransform, salienceDistanceTransform
 from ..draw import colorizeDistance, drawChains, drawEdges, drawRegions
-from ..edges import EdgeStrength
+from ..draw.relief import relief_of, subdued
+from ..edges import EdgeStrength, measure_strength
 from ..explain import Explanation, explain
 from ..io import RangeImage, imreadRange
 from ..noise import measured_frame
-from ..options import DETECTION, GEOMETRY, Growing, ScanLineParams, Selection
+from ..options import DETECTION, GEOMETRY, Growing, Linking, ScanLineParams, Selection
+from ..plausible import RangeEdgeWarning
 from ..regions import seeded_regions
 from ..selection import overallStrength, strengthImage
 
-SLIDERS = {  # name: least, largest, step
+SLIDERS = {  # name: least, largest, step; first those of `Selection`
     "jumpThreshold": (0.0, 1.0, 0.005),
     "creaseThreshold": (0.0, 90.0, 1.0),
     "hysteresis": (0.1, 1.0, 0.05),
@@ -45,31 +48,40 @@ SWITCHES = ("boundaryEdges", "dynamic", "shadowEdges")
 class Session:
     """One user's image and parameters."""
 
-    def __init__(self, image: RangeImage, title: str) -> None:
+    def __init__(self, image: RangeImage, title: str, options: Mapping[str, Any]) -> None:
         self.title = title
-        self.options: dict[str, Any] = {}
+        self.options = dict(options)
         self.use(image)
 
     @classmethod
-    def of_file(cls, path: str | os.PathLike[str], **geometry: Any) -> Session:
+    def of_file(cls, path: str | os.PathLike[str], **options: Any) -> Session:
         """Of an image that is a file here."""
-        return cls(imreadRange(path).withGeometry(**geometry), Path(path).name)
+        own = {name: options.pop(name) for name in list(options) if name in (*SLIDERS, *SWITCHES)}
+        return cls(imreadRange(path).withGeometry(**options), Path(path).name, own)
 
     @classmethod
-    def of_scene(cls) -> Session:
+    def of_scene(cls, **options: Any) -> Session:
         """Of the scene of `rangeedge demo`."""
         from ..app.demo import RenderedScene
 
         scene = RenderedScene()
-        return cls(RangeImage(scene.src, scene.geometry), scene.title)
+        return cls(RangeImage(scene.src, scene.geometry), scene.title, options)
+
+    def copy(self) -> Session:
+        """The same for another user."""
+        return Session(self.image, self.title, self.options)
 
     def use(self, image: RangeImage) -> None:
         """Take an image; on an error everything stays as it was."""
-        params, _ = parsed({**image.geometry, **self.options}, ScanLineParams, Selection)
-        frame = measured_frame(image.src, params)
+        params, selection = parsed({**image.geometry, **self.options}, ScanLineParams, Selection)
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", RangeEdgeWarning)
+            frame = measured_frame(image.src, params)
+        self.notes = [str(w.message) for w in told if issubclass(w.category, RangeEdgeWarning)]
         self.image, self.noise, self._frame = image, frame.noise, frame
-        self._results = Results(frame, params, Selection(**self._own(Selection)))
-        self.relief = drawEdges(image.src, np.zeros(frame.shape, np.uint8), **self.geometry)
+        self.results = Results(frame, params, selection)
+        self.bright = relief_of(frame.depth)
+        self.relief = subdued(self.bright)
 
     def upload(self, name: str, content: bytes) -> None:
         """Take what a user has dropped."""
@@ -102,7 +114,10 @@ class Session:
         else:
             self.options[name] = value
         params, selection = parsed({**self.geometry, **self.options}, ScanLineParams, Selection)
-        self._results = Results(self._frame.with_noise(self.noise), params, selection)
+        if params == self.results.params:
+            self.results = self.results.selecting(selection)
+        else:
+            self.results = Results(self._frame.with_noise(self.noise), params, selection)
 
     @property
     def geometry(self) -> dict[str, Any]:
@@ -116,17 +131,17 @@ class Session:
             return Selection().of(self._results.params).lineSignificance
         return 0.0 if value is None else value
 
-    def picture(self, view: str) -> np.ndarray:
+    def picture(self, view: str, results: Results | None = None) -> np.ndarray:
         """One of `VIEWS`, as large as the image."""
-        return VIEWS[view](self, self._results)
+        return VIEWS[view](self, results or self.results)
 
     def edge_count(self) -> int:
         """How many pixels are edges."""
-        return int(np.count_nonzero(self._results.edges))
+        return int(np.count_nonzero(self.results.edges))
 
     def explanation(self, x: int, y: int) -> Explanation:
         """Why a pixel is an edge or none."""
-        results = self._results
+        results = self.results
         return explain(results.frame, results.params, results.selection, x, y, 24)
 
     def python(self) -> str:
@@ -146,9 +161,6 @@ class Session:
             detector.save(path)
             return path.read_bytes()
 
-    def _own(self, kind: Any) -> dict[str, Any]:
-        return {name: value for name, value in self.options.items() if name in kind.options}
-
 
 class Results:
     """What follows from the parameters, each computed when it is looked at."""
@@ -156,17 +168,20 @@ class Results:
     def __init__(self, frame: Any, params: ScanLineParams, selection: Selection) -> None:
         self.frame, self.params, self.selection = frame, params, selection
 
+    def selecting(self, selection: Selection) -> Results:
+        """With other options of selection, which leave the strengths as they are."""
+        other = Results(self.frame, self.params, selection)
+        if "strength" in vars(self):
+            other.strength = self.strength
+        return other
+
     @cached_property
-    def found(self) -> tuple[np.ndarray, EdgeStrength]:
-        return run_detector(self.frame, self.params, self.selection)
-
-    @property
-    def edges(self) -> np.ndarray:
-        return self.found[0]
-
-    @property
     def strength(self) -> EdgeStrength:
-        return self.found[1]
+        return measure_strength(self.frame, self.params)
+
+    @cached_property
+    def edges(self) -> np.ndarray:
+        return thin_lines(self.frame, selected(self.frame, self.strength, self.selection))
 
     @cached_property
     def distance(self) -> np.ndarray:
@@ -188,12 +203,11 @@ def _edges(session: Session, results: Results) -> np.ndarray:
 
 
 def _chains(session: Session, results: Results) -> np.ndarray:
-    options = {**session.geometry, **session.options, "noise": session.noise}
-    return drawChains(session.relief, linkEdges(session.image.src, **options))
+    return drawChains(session.relief, link_frame(results.frame, results.params, results.selection, Linking()))
 
 
 VIEWS: Mapping[str, Callable[[Session, Results], np.ndarray]] = {
-    "depth": lambda session, _: session.relief,
+    "depth": lambda session, _: session.bright,
     "edges": _edges,
     "kinds": lambda session, r: drawEdges(session.relief // 3, r.strength.kind, r.strength.kind),
     "crease": lambda _, r: cv2.cvtColor(strengthImage(r.strength.crease, 64), cv2.COLOR_GRAY2BGR),
@@ -206,6 +220,11 @@ VIEWS: Mapping[str, Callable[[Session, Results], np.ndarray]] = {
     "regions": lambda session, r: drawRegions(r.regions[1], session.relief, 0.7),
     "chains": _chains,
 }
+SHARING = (  # views whose results follow from each other, in the order in which they are quick to draw
+    ("edges", "thin map", "distance", "kinds", "crease", "depth", "salience"),
+    ("seeds", "regions"),
+    ("chains",),
+)
 
 
 def _numbers(text: str) -> list[float]:
@@ -221,7 +240,10 @@ def _fits(image: RangeImage, other: RangeImage) -> bool:
 
 
 def _written(value: Any) -> str:
-    """A value as a program has it."""
+    """A value as a program has it, a camera without skew by its four numbers."""
     if isinstance(value, np.ndarray):
+        if value.shape == (3, 3):
+            plain = np.array([[value[0, 0], 0, value[0, 2]], [0, value[1, 1], value[1, 2]], [0, 0, 1]])
+            value = value[[0, 1, 0, 1], [0, 1, 2, 2]] if np.array_equal(value, plain) else value
         return repr(value.tolist())
     return repr(value) if isinstance(value, (bool, int, float, str, tuple, list, type(None))) else described(value)
