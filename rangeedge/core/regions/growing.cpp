@@ -261,8 +261,10 @@ void Grower::commit(bool refit) {
         Checkpoints checkpoints;
         for (std::size_t thread = 0; thread < threads; ++thread) {
             std::vector<Offer>& offers = offers_[thread * threads + static_cast<std::size_t>(owner)];
-            for (const auto& [p, i] : offers) {
+            for (std::size_t k = 0; k < offers.size(); ++k) {
                 checkpoints.pass();
+                patches_.prefetch(offers[std::min(k + prefetched, offers.size() - 1)].pixel);
+                const auto [p, i] = offers[k];
                 patches_.take(p, i);
                 came_[p] = round_;
                 if (!refit) continue;
