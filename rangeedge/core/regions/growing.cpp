@@ -236,7 +236,7 @@ int Grower::choose(int p) const {
     return best.patch;
 }
 
-// Calls visit(p, thread) for all pixels p of the front, in parallel if they are many; every thread has a stretch of its own.
+// Calls visit(p, thread) for all pixels p of the front, in parallel if they are many; every thread has its own stretch.
 template <class F>
 void Grower::for_front(F&& visit) {
     const auto visit_all = [&](int begin, int end, int thread) {
