@@ -702,3 +702,28 @@ def test_bad_wrap(transform):
 def test_bad_barrier(transform, barrier):
     with pytest.raises(rangeedge.error, match=rf"{transform.__name__}:.*`barrier`"):
         transform(np.zeros((2, 2), np.uint8), barrier=barrier)
+
+
+@pytest.mark.parametrize(
+    ("near", "far", "levels"),
+    [
+        ((20, 10), (37, 20), (8191323, 15407528)),
+        ((16, 16), (37, 8), (3438579, 5752639)),
+        ((17, 15), (23, 8), (4278727, 4595792)),
+    ],
+)
+def test_quotients_that_differ_less_than_doubles_do(near, far, levels):
+    """500 / 8191323^2 and 1769 / 15407528^2 have one value in double precision; the smaller one wins nevertheless."""
+    squares = [y * y + x * x for y, x in (near, far)]
+    exact = [Fraction(squared, level * level) for squared, level in zip(squares, levels, strict=True)]
+    products = [float(squares[0]) * (levels[1] * levels[1]), float(squares[1]) * (levels[0] * levels[0])]
+    assert products[0] == products[1]
+    assert exact[0] != exact[1]
+    nearest = int(exact[1] < exact[0])
+    for sign in (1, -1):  # either of them comes first in the image
+        salience = np.zeros((81, 81), np.float32)
+        places = [(40 + sign * near[0], 40 + near[1]), (40 - sign * far[0], 40 - far[1])]
+        for place, level in zip(places, levels, strict=True):
+            salience[place] = level / 2**24
+        labels = salienceDistanceTransformWithLabels(salience, SALIENCE_MULTIPLICATIVE)[1]
+        assert labels[40, 40] == np.ravel_multi_index(places[nearest], salience.shape)
