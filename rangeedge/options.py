@@ -400,7 +400,7 @@ class Selection(Options):
         "bool",
         "Whether to remove lines that do not stand out of the noise, by the statistics of all of them (Venkatesh and"
         " Rosin).",
-        flagged="remove lines that do not stand out of the noise, by the statistics of all of them",
+        flagged="remove lines that do not stand out of the statistics of all; it needs these: --min-significance 0",
     )
     boundaryEdges: bool = option(
         False,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import _core
 from ._check import error
 from .options import ScanLineParams
 
@@ -55,6 +56,7 @@ def question_geometry(src: np.ndarray, frame: Frame, params: ScanLineParams) -> 
         _refuse_zeros(src)
     if params.invalid is None and src.ndim == 2:
         _warn_of_outlier(src, frame)
+    _core.checkpoint()
     _warn_of_form(src, frame, plain)
     if params.K is not None and src.size >= _LEAST_IMAGE:
         _warn_of_camera(params.K, src.shape)
@@ -66,6 +68,7 @@ def _refuse_zeros(src: np.ndarray) -> None:
     """Ask what the zeros of a plain image of float depths are."""
     if src.dtype.kind != "f" or src.size < _LEAST_IMAGE:
         return
+    _core.checkpoint()
     zeros = np.count_nonzero(src == 0)
     if zeros < _SEVERAL or np.nanmin(src) < 0:
         return
@@ -84,6 +87,7 @@ def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
         return
     valid = frame.valid > 0
     for bound in (np.max, np.min):
+        _core.checkpoint()
         value = bound(src, where=valid, initial=coarse[0])  # without a copy of the image
         others = coarse[coarse != value].astype(np.float64)
         if not len(others):

@@ -279,7 +279,9 @@ selectEdges.__signature__ = inspect.signature(_of_strength)  # type: ignore[attr
 def select_strength(strength: EdgeStrength, selection: Selection, wrap: bool = False) -> np.ndarray:
     """The edge map before thinning: jumps on their nearer side, creases that do not stand alone, borders if wanted."""
     jump = cv2.copyTo(strength.jump, strength.kind & np.uint8(EDGE_OCCLUDING))
+    _core.checkpoint()
     crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold, wrap)
+    _core.checkpoint()
     edges = select_maps(jump, crease, selection, strength.significance, wrap=wrap)
     if selection.boundaryEdges:
         edges[(strength.kind & EDGE_BOUNDARY) > 0] = 255
@@ -297,6 +299,7 @@ def select_maps(
     """The edge map, 0 and 255, of checked strengths."""
     thresholds, hysteresis = (selection.jumpThreshold or 0.0, selection.creaseThreshold), selection.hysteresis
     edges = _reaching(jump, crease, thresholds)
+    _core.checkpoint()
     if hysteresis < 1:
         low = (hysteresis * thresholds[0], hysteresis * thresholds[1])
         edges = _connected_to(edges, _reaching(jump, crease, low), wrap)
@@ -316,6 +319,7 @@ def _unfrayed(crease: np.ndarray, least: float, wrap: bool) -> np.ndarray:
     if min(crease.shape) < 3:
         return crease
     strong = beside(_at_least(crease, least).view(np.uint8), wrap)
+    _core.checkpoint()
     around = cv2.boxFilter(strong, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)[1:-1, 1:-1]
     return cv2.copyTo(crease, (around >= 4).view(np.uint8))
 

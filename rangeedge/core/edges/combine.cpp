@@ -26,7 +26,7 @@ struct Band {
 void combine(const std::vector<Candidate>& candidates, const Band& band, const EdgeMaps& maps) {
     const auto [jump, crease, kind, significance] = maps;
     constexpr int jumps = jump_bit | occluding_bit | occluded_bit, creases = convex_bit | concave_bit;
-    Checkpoints checkpoints;
+    Checkpoints checkpoints(64);  // each of which may be the first to touch its piece of memory
     std::vector<const Candidate*> others;
     // The largest jump of a pixel (paper, 4.2), and the side of it on which the pixel is.
     for (const Candidate& c : candidates) {
