@@ -67,6 +67,16 @@ def test_noise_on_surfaces_is_halved_and_edges_stay(sensor, seed):
     assert rms((after - rendering.depth)[near]) < 1.02 * rms((before - rendering.depth)[near])
 
 
+@pytest.mark.parametrize("model", [NoiseModel(a=0.07e-3, c=0.15e-3), NoiseModel(a=2.8e-3, c=0.17e-3)])
+def test_pixels_that_only_look_flying_are_not_moved(model):
+    rendering = renderScene(demoScene(), kinectCamera())  # every pixel sees one surface
+    scan = gaussianNoise(rendering, model)
+    cleaned, _ = cleanDepth(scan.src, **scan.geometry)
+    near = np.isfinite(cleaned) & (from_edges(rendering) <= 3)
+    assert near.sum() > 40000
+    assert rms((cleaned - rendering.depth)[near]) < 0.7 * rms((scan.src - rendering.depth)[near])
+
+
 def test_a_hole_in_a_slope_continues_it():
     rendering, depth = seen([plane((0, 0, 1.0), (0.5, 0.3, -1))], 0.001)
     depth[50:66, 70:90] = np.nan
