@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from .._check import deliver, described, fail, integer
+from .._check import boolean, deliver, described, fail, integer
 from .._option import takes
 from ..arcs import ARC, arc_points
 from ..chains import EdgeChain, EdgeChains
@@ -137,6 +137,7 @@ def drawSegments(
         missing = value is None and name == "vertices"
         if not missing and (not isinstance(value, np.ndarray) or value.dtype != dtype):
             raise fail(name, "a structured array from fitSegments", described(value))
+    lengths = boolean("lengths", lengths)
     canvas, scale = canvas_of(src, scale, geometry)
     for segment in segments:
         _line(canvas, segment["pixels"], int(segment["kind"]), scale)
