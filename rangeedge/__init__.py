@@ -22,14 +22,17 @@ edges               detectEdges, detectEdgesWithStrength, createScanLineDetector
 why                 explainPixel, drawExplanation
 strengths           edgeStrength, edgePoints, kindNames, splitScanLine, strengthImage, overallStrength
 select and thin     selectEdges, thinEdges, closeContours
-lines in space      linkEdges, fitSegments, writeLines
+lines in space      linkEdges, fitSegments, writeLines, readLines
 distances           distanceTransform, salienceDistanceTransform, ...WithLabels
-seeds, surfaces     extractSeeds, growRegions, segmentRegions, ...WithStats, regionAdjacency
-pictures (BGR)      drawEdges, drawRegions, drawChains, drawSegments, colorizeDistance, drawOverview, drawPanels
+seeds, surfaces     extractSeeds, growRegions, segmentRegions, ...WithStats
+their outlines      regionBoundaries, regionAdjacency, regionCorners
+pictures (BGR)      drawEdges, drawRegions, drawBoundaries, drawChains, drawSegments, colorizeDistance, drawOverview
+parameters          ScanLineDetector.save and .load, the same files as `--params` of the shell and the explorer
+give up a call      Cancellation, Ctrl-C
 more                rangeedge.synthetic, rangeedge.evaluation, rangeedge.optimality, rangeedge.batch
 
 `help(rangeedge.detectEdges)` has every option. From a shell: `rangeedge --help`; sliders: `rangeedge explore`.
-Every bad argument raises `rangeedge.error`, which is a `cv2.error` and a `ValueError`.
+Every bad value raises `rangeedge.error`, which is a `cv2.error` and a `ValueError`.
 """
 
 from __future__ import annotations

@@ -82,7 +82,7 @@ def directions(text: str) -> int:
 
 def _numbers(text: str, counts: Sequence[int], form: str) -> list[float]:
     try:
-        numbers = [float(part) for part in text.split(",")]
+        numbers = [float(part) for part in text.replace(",", " ").split()]
     except ValueError:
         numbers = []
     if len(numbers) not in counts:

@@ -52,7 +52,7 @@ class ScanLineOptions(TypedDict, total=False):
 class RefinementOptions(TypedDict, total=False):
     hysteresis: float
     minLength: int
-    lineSignificance: float
+    lineSignificance: float | None
     dynamic: bool
     boundaryEdges: bool
 
@@ -532,19 +532,21 @@ class Accessors:
         """
         self._set("minLength", minLength)
 
-    def getLineSignificance(self) -> float:
+    def getLineSignificance(self) -> float | None:
         """getLineSignificance() -> retval
 
         Least significance of a line, >= 0: the root mean square of its pixels' significance, times the root of its
-        length in units of 10 pixels. It may have gaps of two pixels. 0 keeps all lines.
+        length in units of 10 pixels. It may have gaps of two pixels. 0 keeps all lines. None: 20, or 0 where every
+        candidate is kept (`minSignificance` = 0).
         """
         return self._selection.lineSignificance
 
-    def setLineSignificance(self, lineSignificance: float, /) -> None:
+    def setLineSignificance(self, lineSignificance: float | None, /) -> None:
         """setLineSignificance(lineSignificance) -> None
 
         Least significance of a line, >= 0: the root mean square of its pixels' significance, times the root of its
-        length in units of 10 pixels. It may have gaps of two pixels. 0 keeps all lines.
+        length in units of 10 pixels. It may have gaps of two pixels. 0 keeps all lines. None: 20, or 0 where every
+        candidate is kept (`minSignificance` = 0).
         """
         self._set("lineSignificance", lineSignificance)
 

@@ -11,9 +11,10 @@ class Cancellation:
     """Gives up calls when another thread says so.
 
     Calls within the ``with`` block of a cancellation, in the thread that has entered it, raise
-    ``concurrent.futures.CancelledError`` soon after `cancel` was called on any thread: within some 0.1 s while a kernel
-    works, else, as while an image of many megapixels is checked, when the next one starts. Once cancelled it stays so.
-    Blocks may be nested; each of them counts.
+    ``concurrent.futures.CancelledError`` soon after `cancel` was called on any thread: within some 0.1 s, but for what
+    other libraries do in one step (a file that is read, the skeletons of scikit-image). Once cancelled it stays so.
+    Blocks may be nested; each of them counts. Frames of `mapFrames` and `rangeedge.batch.runBatch` count as well, also
+    where other processes work on them: these end what they have begun, and no results come of it.
 
     Ctrl-C needs none of this: it ends a call in Python's main thread as soon, by ``KeyboardInterrupt``. Either way
     nothing is left behind, and an array given as `dst` is as it was.

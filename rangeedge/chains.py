@@ -220,7 +220,7 @@ def link_frame(frame: Frame, params: ScanLineParams, selection: Selection, linki
             part.put(whole, values)
     if not parts:
         kept.append(_candidates(frame, params, strength))
-    thin = thin_lines(frame, selected(frame, strength, selection))
+    thin = thin_lines(frame, selected(frame, strength, selection.of(params)))
     options = _core.LinkOptions(
         bridge=linking.bridge,
         corner_angle=linking.cornerAngle,

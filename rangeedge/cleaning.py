@@ -14,6 +14,7 @@ from ._option import parsed, takes
 from .constants import CLEAN_FILLED, CLEAN_REMOVED, CLEAN_SMOOTHED
 from .detector import selected, thin_lines
 from .edges import kernel_options, no_strength
+from .flying import keep_limbs
 from .forms import range_array
 from .frame import Frame
 from .noise import measured_frame
@@ -152,6 +153,7 @@ def _edges_and_flying(frame: Frame, params: ScanLineParams, flying: np.ndarray) 
     """The edges, thin, and in `flying` 255 where pixels fly: both by one approximation of the scan lines."""
     strength = no_strength(frame.shape)
     _core.edge_strength_and_flying(frame.kernel, kernel_options(frame, params), frame.threads, *strength, flying)
+    keep_limbs(frame, params, flying)
     return thin_lines(frame, selected(frame, strength, Selection()))
 
 
@@ -170,6 +172,8 @@ def _narrow(missing: np.ndarray, most: int) -> np.ndarray:
     around = np.pad(missing, most, constant_values=True)
     reach = most / 2 + 0.5  # from centres of pixels to those of pixels with data
     middles = _distance(around) > reach
+    if not middles.any():
+        return missing.view(np.uint8)
     return (missing & (_distance(~middles) > reach)[most:-most, most:-most]).view(np.uint8)
 
 

@@ -157,7 +157,7 @@ def run_detector(frame: Frame, params: ScanLineParams, selection: Selection) -> 
     warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
     warn_of_angle(selection.creaseThreshold)
     strength = measure_strength(frame, params)
-    return thin_lines(frame, selected(frame, strength, selection)), strength
+    return thin_lines(frame, selected(frame, strength, selection.of(params))), strength
 
 
 def selected(frame: Frame, strength: EdgeStrength, selection: Selection) -> np.ndarray:

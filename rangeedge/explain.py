@@ -11,7 +11,7 @@ import numpy as np
 
 from ._check import fail, integer
 from ._option import parsed, takes
-from .constants import EDGE_JUMP, EDGE_OCCLUDING
+from .constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, EDGE_OCCLUDING
 from .detector import run_detector, selected, thin_lines
 from .edges import kindNames, measure_strength
 from .frame import Frame
@@ -32,8 +32,19 @@ _EVERYTHING: dict[str, Any] = {"minLength": 1, "lineSignificance": 0.0, "dynamic
 _RAISED, _LOWERED = 1.001, 0.999  # past a limit, beyond the rounding of the maps
 _NAN = float("nan")
 _COMPANY = 4  # creases of the nine pixels around one that stays, as selection.py has it
-_NEARBY = 3  # pixels, up to which an edge is named
 _TESTS = ("gap", "single", "smooth", "smeared", "significance")  # in the order in which cuts get to them
+
+
+class Neighbour(NamedTuple):
+    """An edge or a candidate beside a pixel."""
+
+    x: int
+    y: int
+    distance: float  # between the pixels
+    edge: bool  # or only a candidate
+    jump: float
+    crease: float
+    kind: int
 
 
 class Explanation(NamedTuple):
@@ -47,7 +58,7 @@ class Explanation(NamedTuple):
     value: float  # what the deciding test compares, and with what; NaN where there is no number
     limit: float
     change: Mapping[str, Any]  # options that turn the answer, tried on this image; {} where none was found
-    passes: tuple[int, int] | None  # the nearest edge pixel within a few pixels
+    nearest: tuple[Neighbour, ...]  # of a pixel that is none: the nearest edge, and a candidate that is nearer
     depth: float
     noise: float  # standard deviation of the depth there
     jump: float
@@ -116,8 +127,9 @@ def explainPixel(
     -------
     retval : Explanation
         Among others `edge`, `stage`, `reason`, the `value` that was compared with `limit`, `change`, a dict of options
-        that turn the answer for this pixel (tried before they are named), `passes`, the edge pixel nearest by, and
-        `lines`: for every direction samples, segments with their curves, tolerances and cuts, these with strengths,
+        that turn the answer for this pixel (tried before they are named), `nearest`, where within `reach`
+        the nearest edge is, and the nearest candidate if that is nearer, each with place, distance, strengths and kind,
+        and `lines`: for every direction samples, segments with their curves, tolerances and cuts, these with strengths,
         significances and the test that each failed. Depths and jumps are in the unit of the image, angles in degrees,
         significances in standard deviations, ordinates inverse depths (with a camera) or heights.
 
@@ -174,7 +186,8 @@ class _Case:
     """One pixel, on its way through the detector."""
 
     def __init__(self, frame: Frame, params: ScanLineParams, selection: Selection, x: int, y: int) -> None:
-        self.frame, self.params, self.selection, self.x, self.y = frame, params, selection, x, y
+        self.frame, self.params, self.selection, self.x, self.y = frame, params, selection.of(params), x, y
+        self.given = selection
         self.thin, self.strength = run_detector(frame, params, selection)
         self.edge = bool(self.thin[y, x])
         jump, crease, kind, significance = (m[y, x].item() for m in self.strength)
@@ -188,7 +201,7 @@ class _Case:
         return Explanation(
             x=x, y=y, edge=self.edge, stage=verdict.stage, reason=verdict.reason, value=verdict.value,
             limit=verdict.limit, change=self._change(verdict.trials),
-            passes=None if self.edge else self._nearest_edge(),
+            nearest=() if self.edge else tuple(self._nearest(reach)),
             depth=-depth if frame.heightMap else depth, noise=_noise_at(frame, x, y, depth), jump=self.jump,
             crease=self.crease, kind=self.kind, significance=self.significance, lines=lines,
         )  # fmt: skip
@@ -280,22 +293,35 @@ class _Case:
         own = {**vars(self.params), **vars(self.selection)}
         for trial in trials:
             change = {name: value for name, value in trial.items() if own[name] != value}
-            params, selection = (_with(options, change) for options in (self.params, self.selection))
+            params, selection = (_with(options, change) for options in (self.params, self.given))
             if not change:
                 continue
             strength = self.strength if params == self.params else measure_strength(self.frame, params)
-            thin = thin_lines(self.frame, selected(self.frame, strength, selection))
+            thin = thin_lines(self.frame, selected(self.frame, strength, selection.of(params)))
             if bool(thin[self.y, self.x]) != self.edge:
                 return change
         return {}
 
-    def _nearest_edge(self) -> tuple[int, int] | None:
-        top, left = max(self.y - _NEARBY, 0), max(self.x - _NEARBY, 0)
-        rows, cols = np.nonzero(self.thin[top : self.y + _NEARBY + 1, left : self.x + _NEARBY + 1])
-        if not len(rows):
-            return None
-        nearest = int(np.argmin((rows + top - self.y) ** 2 + (cols + left - self.x) ** 2))
-        return int(cols[nearest]) + left, int(rows[nearest]) + top
+    def _nearest(self, reach: int) -> Iterator[Neighbour]:
+        """The nearest edge, and the nearest candidate where that is nearer.
+
+        None of these is the farther side of a jump, nor what touches an edge, whose line that is part of.
+        """
+        top, left = max(self.y - reach, 0), max(self.x - reach, 0)
+        part = np.s_[top : self.y + reach + 1, left : self.x + reach + 1]
+        jump, crease, kind, _ = (values[part] for values in self.strength)
+        rows, cols = np.ogrid[: kind.shape[0], : kind.shape[1]]
+        distance = np.hypot(rows + top - self.y, cols + left - self.x)
+        distance[(distance == 0) | (distance > reach)] = np.inf
+        edge, bits = self.thin[part] > 0, np.uint8(EDGE_OCCLUDING | EDGE_CONVEX | EDGE_CONCAVE)
+        farthest = np.inf
+        lines = cv2.dilate(self.thin, np.ones((3, 3), np.uint8))[part] > 0
+        for marked in (edge, (kind & bits > 0) & ~lines):
+            place = np.unravel_index(np.argmin(np.where(marked, distance, np.inf)), kind.shape)
+            if marked[place] and distance[place] < farthest:
+                farthest = float(distance[place])
+                strengths = (values[place].item() for values in (jump, crease, kind))
+                yield Neighbour(int(place[1]) + left, int(place[0]) + top, farthest, bool(edge[place]), *strengths)
 
 
 def _for_cut(cut: Cut) -> Iterator[dict[str, Any]]:
@@ -355,8 +381,8 @@ def _said(why: Explanation) -> Iterator[str]:
     if why.change:
         options = ", ".join(f"{name}={value!r}" for name, value in why.change.items())
         yield f"  With {options} it is {'none' if why.edge else 'one'}."
-    if why.passes:
-        yield f"  The nearest edge passes ({why.passes[0]}, {why.passes[1]})."
+    for found in why.nearest:
+        yield f"  {_beside(found)}"
     for line in why.lines:
         segment = line.segments[(line.segments["first"] <= line.at) & (line.segments["last"] >= line.at)]
         size = f"in a segment of {int(segment['last'][0] - segment['first'][0]) + 1} pixels" if len(segment) else ""
@@ -364,3 +390,10 @@ def _said(why: Explanation) -> Iterator[str]:
         yield f"{line.name}: {size}{curve}, tolerance {line.samples['toleranceDepth'][line.at]:.2g}"
         for cut in sorted(line.cuts, key=lambda c: abs(c.sample - line.at))[:3]:
             yield f"  cut {cut.sample - line.at:+.1f} px, at ({cut.x:.1f}, {cut.y:.1f}), {cut.kind}: {cut.fate}"
+
+
+def _beside(found: Neighbour) -> str:
+    size = f"a jump of {found.jump:.4g}" if found.kind & EDGE_JUMP else f"a crease of {found.crease:.3g} degrees"
+    what = "edge" if found.edge else "candidate, itself no edge,"
+    away = f"{found.distance:.3g} {'pixel' if found.distance == 1 else 'pixels'} away"
+    return f"The nearest {what} is ({found.x}, {found.y}), {away}: {size}, {kindNames(found.kind)}."

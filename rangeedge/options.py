@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -61,6 +61,9 @@ def _noise(name: str, value: Any) -> NoiseModel | float | np.ndarray:
     if isinstance(value, NoiseModel):
         return value
     if not isinstance(value, np.ndarray):
+        if isinstance(value, str) or callable(value):
+            model = "a NoiseModel, such as NoiseModel.kinect1()"
+            raise _check.fail(name, f"a number, {model}, or a real array of shape (H, W)", _check.described(value))
         return _check.number(name, value, 0, above=True)
     expected = "a number, a NoiseModel, or a real array of shape (H, W)"
     value = _check.array(name, value, expected)
@@ -81,6 +84,7 @@ def _below_one(name: str, value: Any) -> float:
     return value
 
 
+LINE_SIGNIFICANCE = 20.0  # of lines of candidates that are significant
 FITS = {"FIT_LSQ": FIT_LSQ, "FIT_INTERP": FIT_INTERP}
 MEASURES = {"MEASURE_MIDPOINT": MEASURE_MIDPOINT, "MEASURE_ENDPOINT": MEASURE_ENDPOINT}
 CREASES = {"CREASE_MAX": CREASE_MAX, "CREASE_NORMAL": CREASE_NORMAL}
@@ -338,7 +342,7 @@ class ScanLineParams(Options):
     def paper(cls, **options: Any) -> ScanLineParams:
         """The paper's basic setting: interpolating fits, cuts as they fall, nothing merged, every candidate kept.
 
-        All of its lines are edges with the option `lineSignificance` = 0 of the selection.
+        With it `lineSignificance=None` keeps all lines.
         """
         basic = {"fit": FIT_INTERP, "crease": CREASE_MAX, "maxShift": 0.0, "maxGap": 0, "maxSmear": 0}
         kept = {"shadowEdges": False, "mergeSignificance": 0.0, "minSignificance": 0.0}
@@ -380,12 +384,15 @@ class Selection(Options):
         "Least length of a connected line, >= 1: the longer side of its bounding box.",
         unit="pixels",
     )
-    lineSignificance: float = option(
-        20.0,
-        _real(0),
-        "float",
+    lineSignificance: float | None = option(
+        None,
+        _or_none(_real(0)),
+        "float or None",
         "Least significance of a line, >= 0: the root mean square of its pixels' significance, times the root of its"
-        " length in units of 10 pixels. It may have gaps of two pixels. 0 keeps all lines.",
+        " length in units of 10 pixels. It may have gaps of two pixels. 0 keeps all lines. None: 20, or 0 where every"
+        " candidate is kept (`minSignificance` = 0).",
+        flagged="least significance of a line: the root mean square of its pixels', times the root of its length in"
+        " units of 10 pixels; 0 keeps all (default: 20, or 0 with --min-significance 0)",
     )
     dynamic: bool = option(
         False,
@@ -393,7 +400,7 @@ class Selection(Options):
         "bool",
         "Whether to remove lines that do not stand out of the noise, by the statistics of all of them (Venkatesh and"
         " Rosin).",
-        flagged="remove lines that do not stand out of the noise, by the statistics of all of them",
+        flagged="remove lines that do not stand out of the statistics of all; it needs these: --min-significance 0",
     )
     boundaryEdges: bool = option(
         False,
@@ -403,6 +410,12 @@ class Selection(Options):
         " another surface is seen beyond; see `shadowEdges`.",
         flagged="every border with pixels without data is an edge; see also --shadow-edges",
     )
+
+    def of(self, params: ScanLineParams) -> Selection:
+        """The same for strengths that were measured with these parameters."""
+        if self.lineSignificance is not None:
+            return self
+        return replace(self, lineSignificance=LINE_SIGNIFICANCE if params.minSignificance > 0 else 0.0)
 
 
 @declared

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import _core
 from ._check import error
 from .options import ScanLineParams
 
@@ -76,6 +77,7 @@ def question_geometry(src: np.ndarray, frame: Frame, params: ScanLineParams) -> 
         _refuse_zeros(src)
     if params.invalid is None and src.ndim == 2:
         _warn_of_outlier(src, frame)
+    _core.checkpoint()
     _warn_of_form(src, frame, plain)
     if params.K is not None and src.size >= _LEAST_IMAGE:
         _warn_of_camera(params.K, src.shape)
@@ -87,6 +89,7 @@ def _refuse_zeros(src: np.ndarray) -> None:
     """Ask what the zeros of a plain image of float depths are."""
     if src.dtype.kind != "f" or src.size < _LEAST_IMAGE:
         return
+    _core.checkpoint()
     zeros = np.count_nonzero(src == 0)
     if zeros < _SEVERAL or np.nanmin(src) < 0:
         return
@@ -105,6 +108,7 @@ def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
         return
     valid = frame.valid > 0
     for bound in (np.max, np.min):
+        _core.checkpoint()
         value = bound(src, where=valid, initial=coarse[0])  # without a copy of the image
         others = coarse[coarse != value].astype(np.float64)
         if not len(others):
@@ -116,8 +120,9 @@ def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
         count = np.count_nonzero(src == value)
         if count >= _SEVERAL:
             warn(
-                f"`src` is {value:g} at {count} of {src.size} pixels, far from all others: say invalid={value:g} if"
-                " these have no data, invalid=() if they have"
+                f"{count} of {src.size} pixels of `src` are exactly {value:g}, far from the others (about"
+                f" {others.min():g} to {others.max():g}), as if that stood for no data: say invalid={value:g} if it"
+                " does, invalid=() if it was measured"
             )
 
 

@@ -14,7 +14,7 @@ from ._option import takes
 from .constants import EDGE_BOUNDARY, EDGE_OCCLUDING
 from .dynamic import outstanding
 from .edges import EdgeStrength
-from .options import SELECTION, Selection
+from .options import LINE_SIGNIFICANCE, SELECTION, Selection
 from .pixels import beside, components, pixels_of
 
 if TYPE_CHECKING:
@@ -180,6 +180,8 @@ def selectEdges(*args: Any, **options: Any) -> np.ndarray:
     minLength : int
         Least length of an 8-connected component in pixels, >= 1; by default 5 for `strength`, else 1. The length is
         the longer side of the bounding box: the number of pixels of a straight line, however thick.
+    lineSignificance : float or None
+        Least significance of a line of `strength`, as in `detectEdges`; None is 20, whatever made the strengths.
     dynamic : bool
         Whether to apply the dynamic threshold. It needs a map whose candidates are mostly noise, so pass
         strengths found with ``minSignificance=0`` and low thresholds.
@@ -277,7 +279,9 @@ selectEdges.__signature__ = inspect.signature(_of_strength)  # type: ignore[attr
 def select_strength(strength: EdgeStrength, selection: Selection, wrap: bool = False) -> np.ndarray:
     """The edge map before thinning: jumps on their nearer side, creases that do not stand alone, borders if wanted."""
     jump = cv2.copyTo(strength.jump, strength.kind & np.uint8(EDGE_OCCLUDING))
+    _core.checkpoint()
     crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold, wrap)
+    _core.checkpoint()
     edges = select_maps(jump, crease, selection, strength.significance, wrap=wrap)
     if selection.boundaryEdges:
         edges[(strength.kind & EDGE_BOUNDARY) > 0] = 255
@@ -295,11 +299,13 @@ def select_maps(
     """The edge map, 0 and 255, of checked strengths."""
     thresholds, hysteresis = (selection.jumpThreshold or 0.0, selection.creaseThreshold), selection.hysteresis
     edges = _reaching(jump, crease, thresholds)
+    _core.checkpoint()
     if hysteresis < 1:
         low = (hysteresis * thresholds[0], hysteresis * thresholds[1])
         edges = _connected_to(edges, _reaching(jump, crease, low), wrap)
-    if selection.minLength > 1 or (significance is not None and selection.lineSignificance > 0):
-        edges = _lines(edges, selection.minLength, significance, selection.lineSignificance, wrap)
+    least = LINE_SIGNIFICANCE if selection.lineSignificance is None else selection.lineSignificance
+    if selection.minLength > 1 or (significance is not None and least > 0):
+        edges = _lines(edges, selection.minLength, significance, least, wrap)
     if selection.dynamic:
         edges &= outstanding(jump, wrap) | outstanding(crease, wrap)
     return edges.view(np.uint8) * np.uint8(255)
@@ -313,6 +319,7 @@ def _unfrayed(crease: np.ndarray, least: float, wrap: bool) -> np.ndarray:
     if min(crease.shape) < 3:
         return crease
     strong = beside(_at_least(crease, least).view(np.uint8), wrap)
+    _core.checkpoint()
     around = cv2.boxFilter(strong, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)[1:-1, 1:-1]
     return cv2.copyTo(crease, (around >= 4).view(np.uint8))
 

@@ -2,8 +2,9 @@
 
     python tests/fuzz.py --minutes 60
 
-runs until the time is up or a call breaks the rules, which it then prints, made as small as possible; a build with
-sanitizers (CONTRIBUTING.md) finds more. `pytest tests/test_fuzz.py` makes a few of the same calls.
+calls every function for its share of the time, each in a process of its own, and prints how many answers and errors
+came, and one call for each place where the rules are broken; a build with sanitizers (CONTRIBUTING.md) finds more.
+`pytest tests/test_fuzz.py` makes a few of the same calls.
 
 Rules: no exception but `rangeedge.error`; no warning but `RangeEdgeWarning`; inputs as they were; the same answer, bit
 for bit, from a second call with another number of threads; a `dst` that fits is returned, any other left alone.
@@ -13,18 +14,21 @@ from __future__ import annotations
 
 import argparse
 import inspect
+import itertools
 import os
 import subprocess
 import sys
 import time
 import traceback
 import warnings
+from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import cv2
 import numpy as np
-from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis import strategies as st
 
 import rangeedge
@@ -32,6 +36,7 @@ from rangeedge import evaluation
 
 TINY, LARGE = 5e-324, 1.7e308
 BUNCH = 40  # calls, after which the time is looked at
+BEGINS = "bunch "  # what a process says before its number
 PACKAGE = str(Path(rangeedge.__file__).parent)
 NUMBERS = [
     *(0, 1, -1, 2, 3, 8, 30, 64, 255, 1000, 2**31 - 1, 2**31, 2**63, -(2**63), 10**400),
@@ -43,7 +48,10 @@ ODD = [None, "", "x", b"x", (), [], {}, object(), 1j, (1, 2), [[1], [2, 3]], np.
 DTYPES = ["u1", "?", "u2", "i2", "i4", "u4", "i8", "f2", "f4", "f8", "g"]
 SHAPES = [(1, 1), (1, 7), (9, 1), (2, 2), (3, 5), (16, 16), (24, 33), (33, 24), (64, 80), (7, 120)]
 
+USUAL = [0.01, 0.1, 0.5, 1, 1.0, 2, 3, 5, 8, 20, 30.0, 90.0]
+
 values = st.sampled_from(NUMBERS)
+usual = st.sampled_from(USUAL)
 seeds = st.integers(0, 2**16)
 
 
@@ -106,7 +114,7 @@ LAYOUTS = ["plain", "plain", "readonly", "fortran", "reversed", "strided", "swap
 def images(draw: Any, shape: tuple[int, int], dtypes: list[str] = DTYPES, deep: bool = False) -> np.ndarray:
     kind, rng = draw(st.sampled_from(KINDS)), np.random.default_rng(draw(seeds))
     if deep and draw(st.booleans()):
-        shape = (*shape, draw(st.sampled_from([3, 4])))
+        shape, dtypes = (*shape, draw(st.sampled_from([3, 4]))), ["f4", "f8"]
     image = content(shape, kind, rng)
     if draw(st.booleans()):
         image[rng.random(shape[:2]) < 0.1] = np.nan
@@ -124,7 +132,13 @@ FLAGS = {
     "crease": [rangeedge.CREASE_MAX, rangeedge.CREASE_NORMAL],
     "directions": list(range(1, 16)),
     "method": [0, 1, 2, 3],
-    **{name: [False, True] for name in ("heightMap", "dynamic", "boundaryEdges", "wrap", "newSeeds", "log", "lengths")},
+    **{
+        name: [False, True]
+        for name in (
+            *("heightMap", "dynamic", "boundaryEdges", "wrap", "newSeeds", "log", "lengths", "key"),
+            *("shadowEdges", "removeFlying"),
+        )
+    },
 }
 CAMERAS = [(50, 50, 16, 12), (1e-3, 1e3, 0, 0), (1e300, 1e-300, 0, 0), [[60, 2, 9], [0, 60, 9], [0, 0, 1]]]
 GIVEN = {
@@ -134,21 +148,21 @@ GIVEN = {
     "origin": [(0, 0, 0), (1, 2, 3), (1e300, 0, 0)],
     "invalid": [0, (1, 2), (0, (5, 9)), np.nan],
     "noise": [0.01, 1e-4, rangeedge.NoiseModel(0.01, 0, 1e-3), rangeedge.NoiseModel(1e-300, 0, 1e300)],
+    "imageSize": [(33, 24), (640, 480), (10**6, 1)],
     "scale": [1, 2, 3],
     "title": ["", "x\udcff", "\0\n"],
     "transform": [(0, 1, 0, 0, 0, 1)],
-    "elevation": [np.linspace(-0.2, 0.2, 16), (-0.2, 0.2)],
-    "azimuth": [(0, 6.28)],
 }
-MASKS = ("mask", "edges", "barrier", "kind", "ignore", "thin")
-DEEP = ("src", "points")
-LABELS = ("labels", "markers", "truth")
+MASKS = ("mask", "edges", "barrier", "ignore")
+DEEP = ("src",)
+LABELS = ("labels", "markers")
+ABOVE = ("distance", "salience", "strength", "jump", "crease")
 
 
 @st.composite
 def arguments(draw: Any, name: str, shape: tuple[int, int]) -> Any:
     """A value for a parameter of that name: mostly one that is meant, sometimes none that is."""
-    oddity = draw(st.integers(0, 19))
+    oddity = draw(st.sampled_from(range(40)))
     if oddity == 0:
         return draw(st.sampled_from(ODD))
     if oddity == 1:
@@ -163,28 +177,60 @@ def arguments(draw: Any, name: str, shape: tuple[int, int]) -> Any:
         return draw(images(shape, ["u1", "?"]))
     if name in LABELS:
         return draw(images(shape, ["i4"]))
+    if name == "truth":
+        return draw(images(shape, ["u1", "i4"]))
     if name in DEEP:
         return draw(images(shape, deep=True))
-    if name in ("distance", "salience", "strength", "jump"):
-        return np.abs(draw(images(shape, ["u1", "f4", "f8"])))
+    if name in ABOVE:
+        image = np.abs(draw(images(shape, ["u1", "f4"] if name == "salience" else ["u1", "f4", "f8"])))
+        if image.dtype.kind == "f" and oddity > 7:
+            image = np.where(image < np.inf, image, 0)
+            return np.minimum(image, 1, dtype=image.dtype) if name == "salience" else image
+        return image
+    if name == "points":
+        return draw(images((*shape, 3), ["f4", "f8"]))
+    if name == "frames":
+        return draw(images((draw(st.integers(1, 3)), *shape)))
     if name == "z":
         return draw(images((1, shape[0] * shape[1])))[0]
-    return draw(values)
+    if name in ("elevation", "azimuth"):
+        return np.linspace(-80, 80, shape[name == "azimuth"])
+    if name in "xy":
+        return draw(st.integers(0, shape[1 - "xy".index(name)]))
+    return draw(values if oddity < 8 else usual)
 
 
 SCENE = np.where(np.arange(33) < 15, 1.0, 2.0) * np.ones((24, 1)) + 0.02 * np.arange(24)[:, None]
 STRENGTH = rangeedge.edgeStrength(SCENE)
 CHAINS = rangeedge.linkEdges(SCENE)
-SEGMENTS = rangeedge.fitSegments(CHAINS)
+SEGMENTS, VERTICES = rangeedge.fitSegments(CHAINS, minPoints=2)
+REGIONS = (SCENE > 1.5).astype(np.int32) + 1
+BOUNDARIES = rangeedge.regionBoundaries(REGIONS, SCENE)
+BROKEN = SEGMENTS.copy()
+BROKEN["pixels"], BROKEN["ends"], BROKEN["vertices"] = np.inf, np.nan, 10**6
+EXPLAINED = [rangeedge.explainPixel(SCENE, x, 3, reach=reach) for x, reach in ((14, 20), (0, 3), (20, 40))]
+PICTURE = np.zeros((24, 33, 3), np.uint8)
 MADE = {
-    ("selectEdges", "strength"): STRENGTH,
-    ("drawOverview", "strength"): STRENGTH,
-    ("fitSegments", "chains"): CHAINS,
-    ("drawChains", "chains"): CHAINS,
-    ("drawSegments", "segments"): SEGMENTS,
-    ("kindNames", "kind"): 5,
+    ("selectEdges", "strength"): [STRENGTH],
+    ("drawOverview", "strength"): [STRENGTH],
+    ("fitSegments", "chains"): [CHAINS, list(CHAINS), CHAINS[:0]],
+    ("drawChains", "chains"): [CHAINS, CHAINS[:0]],
+    ("drawSegments", "segments"): [SEGMENTS, SEGMENTS[:0], BROKEN],
+    ("drawSegments", "vertices"): [VERTICES, VERTICES[:0]],
+    ("drawBoundaries", "boundaries"): [BOUNDARIES],
+    ("drawEdges", "kind"): [STRENGTH.kind],
+    ("toLines", "lines"): [CHAINS, list(CHAINS), SEGMENTS, BROKEN, BOUNDARIES],
+    ("drawPanels", "panels"): [[("a", PICTURE)], [("a", PICTURE), ("x\udcff", PICTURE[:9, :5, 0])]],
+    ("drawExplanation", "explanation"): EXPLAINED,
+    ("mapFrames", "function"): [rangeedge.detectEdges, rangeedge.edgePoints, rangeedge.thinEdges],
+    ("mapFrames", "jobs"): [1],  # others would be hundreds of processes
+    ("kindNames", "kind"): [5],
+    ("overallStrength", "crease"): [STRENGTH.crease],
+    ("overallStrength", "jump"): [STRENGTH.jump],
+    ("createScanLineDetector", "params"): [rangeedge.ScanLineParams(noise=0.1)],
 }
-FILES = ("imreadRange", "imwriteRange", "writeLines")  # tests/test_broken_files.py is about these
+LIKE_SCENE = {name for name, _ in MADE if name.startswith(("draw", "overall"))}
+FILES = ("imreadRange", "imwriteRange", "readLines", "writeLines")  # tests/test_broken_files.py is about these
 FUNCTIONS = {
     name: function
     for name in rangeedge.__all__
@@ -201,18 +247,16 @@ def destination(name: str) -> str:
 @st.composite
 def calls(draw: Any, name: str) -> dict[str, Any]:
     """Keyword arguments for a function: those that must be given, and a few others."""
-    shape = draw(st.sampled_from(SHAPES))
-    made = [argument for function, argument in MADE if function == name]
-    if made or name in ("drawChains", "drawSegments", "drawOverview"):
-        shape = SCENE.shape
+    shape = SCENE.shape if name in LIKE_SCENE else draw(st.sampled_from(SHAPES))
     parameters = inspect.signature(FUNCTIONS[name]).parameters
     needed = [p for p in parameters if parameters[p].default is inspect.Parameter.empty]
     optional = [p for p in parameters if p not in needed]
     chosen = draw(st.lists(st.sampled_from(optional), max_size=4, unique=True)) if optional else []
     given_values = {}
     for argument in [*needed, *chosen]:
-        if argument in made and draw(st.integers(0, 9)):
-            given_values[argument] = MADE[name, argument]
+        made = MADE.get((name, argument))
+        if made and (argument == "jobs" or draw(st.integers(0, 9))):
+            given_values[argument] = draw(st.sampled_from(made))
         elif argument == destination(name):
             like = draw(st.sampled_from(["f4", "u1", "f8", "i4"]))
             given_values[argument] = draw(
@@ -224,6 +268,8 @@ def calls(draw: Any, name: str) -> dict[str, Any]:
 
 
 def leaves(result: Any) -> list[Any]:
+    if isinstance(result, rangeedge.frames.FrameResult):
+        result = result._replace(seconds=0.0)
     if isinstance(result, (tuple, list)):
         return [leaf for part in result for leaf in leaves(part)]
     return [result]
@@ -241,13 +287,14 @@ def outcome(name: str, given_values: dict[str, Any], threads: int) -> Any:
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", rangeedge.RangeEdgeWarning)
         try:
-            return FUNCTIONS[name](**given_values)
+            result = FUNCTIONS[name](**given_values)
+            return list(result) if isinstance(result, Iterator) else result
         except rangeedge.error as problem:
-            return f"{problem.func}: {problem.err}"
+            return problem
 
 
-def expect_rules(name: str, given_values: dict[str, Any]) -> None:
-    """Makes a call twice and asserts that it keeps the rules."""
+def expect_rules(name: str, given_values: dict[str, Any]) -> bool:
+    """Makes a call twice and asserts that it keeps the rules; whether it is answered."""
     arrays = {k: v for k, v in given_values.items() if isinstance(v, np.ndarray) and k != destination(name)}
     before = {k: frozen(v) for k, v in arrays.items()}
     dst = given_values.get(destination(name))
@@ -263,24 +310,29 @@ def expect_rules(name: str, given_values: dict[str, Any]) -> None:
         cv2.setNumThreads(threads)
     assert kept == [frozen(leaf) for leaf in leaves(second)], "the answer changes"
     assert before == {k: frozen(v) for k, v in arrays.items()}, "an input was modified"
+    return not isinstance(first, rangeedge.error)
 
 
-def fuzz(name: str, examples: int, *, shrink: bool = False, derandomize: bool = False) -> None:
-    """Makes that many calls of a function."""
+def fuzz(
+    name: str, examples: int, bunch: int | None = None, *, shrink: bool = False, seen: Counter[str] | None = None
+) -> None:
+    """Makes that many calls of a function, those of a numbered bunch or always the same; counts what came of them."""
 
     @settings(
         max_examples=examples,
         deadline=None,
         database=None,
-        derandomize=derandomize,
+        derandomize=bunch is None,
         suppress_health_check=list(HealthCheck),
         phases=[Phase.generate, Phase.shrink] if shrink else [Phase.generate],
     )
     @given(calls(name))
     def run(given_values: dict[str, Any]) -> None:
-        expect_rules(name, given_values)
+        answered = expect_rules(name, given_values)
+        if seen is not None:
+            seen["answers" if answered else "errors"] += 1
 
-    run()
+    (run if bunch is None else seed(bunch)(run))()
 
 
 def place(problem: BaseException) -> str:
@@ -290,33 +342,57 @@ def place(problem: BaseException) -> str:
     return f"{type(problem).__name__} at {frames[-1].filename}:{frames[-1].lineno}"
 
 
-def fuzz_for(name: str, seconds: float, *, shrink: bool = False) -> int:
+def fuzz_for(name: str, seconds: float, first: int, *, shrink: bool = False) -> int:
     """Calls a function until the time is up; prints one call for each place where one fails, and returns how many."""
-    end, made, found = time.monotonic() + seconds, 0, set()
-    while time.monotonic() < end:
-        made += BUNCH
+    start, found, seen = time.monotonic(), set(), Counter()
+    for bunch in itertools.count(first):
+        if time.monotonic() > start + seconds:
+            break
+        print(f"{BEGINS}{bunch}", flush=True)
         try:
-            fuzz(name, BUNCH, shrink=shrink)
+            fuzz(name, BUNCH, bunch, shrink=shrink, seen=seen)
         except Exception as problem:
             if place(problem) not in found:
                 found.add(place(problem))
                 print(f"{name}: {place(problem)}: {problem}", *getattr(problem, "__notes__", []), sep="\n", flush=True)
-    print(f"{name}: {made} calls, {len(found)} kinds of failures", flush=True)
+    print(
+        f"{name:36} {seen['answers']:7} answers {seen['errors']:7} errors {time.monotonic() - start:6.0f} s"
+        f" {len(found)} kinds of failures",
+        flush=True,
+    )
     return len(found)
+
+
+def fuzz_apart(name: str, seconds: float, first: int, *, shrink: bool = False) -> int:
+    """The same in a process of its own, whose death is a failure, too."""
+    bunch = first
+    command = [sys.executable, "-u", __file__, "--minutes", str(seconds / 60), "--only", name, "--bunch", str(first)]
+    with subprocess.Popen([*command, "--here", *["--shrink"] * shrink], stdout=subprocess.PIPE, text=True) as run:
+        for line in run.stdout:
+            if line.startswith(BEGINS):
+                bunch = int(line.removeprefix(BEGINS))
+            else:
+                print(line, end="", flush=True)
+    if run.returncode in (0, 1):
+        return run.returncode
+    print(f"{name}: died, exit code {run.returncode}; again by --here --only {name} --bunch {bunch}", flush=True)
+    return 1
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--only", nargs="*", default=list(FUNCTIONS), choices=FUNCTIONS, metavar="FUNCTION")
+    parser.add_argument("--bunch", type=int, default=0, metavar="N", help="begin with this bunch of calls")
+    parser.add_argument("--here", action="store_true", help="all in this process, which a crash ends")
     parser.add_argument(
         "--shrink", action="store_true", help="make calls that fail as small as possible, which takes long"
     )
     parser.add_argument("--files", action="store_true", help="mutated files, too")
     options = parser.parse_args()
-    failed = sum(
-        fuzz_for(name, 60 * options.minutes / len(options.only), shrink=options.shrink) for name in options.only
-    )
+    seconds = 60 * options.minutes / len(options.only)
+    fuzzing = fuzz_for if options.here else fuzz_apart
+    failed = sum(fuzzing(name, seconds, options.bunch, shrink=options.shrink) for name in options.only)
     if options.files:
         environment = {**os.environ, "RANGEEDGE_FUZZ": "1000"}
         files = Path(__file__).with_name("test_broken_files.py")

@@ -1,6 +1,8 @@
 """Calls that are given up: by Ctrl-C, from another thread, and when Python ends."""
 
 import _thread
+import functools
+import json
 import os
 import signal
 import subprocess
@@ -14,6 +16,11 @@ import numpy as np
 import pytest
 
 import rangeedge
+from rangeedge.batch import runBatch
+from rangeedge.frame import read_frame
+from rangeedge.options import ScanLineParams, Selection
+from rangeedge.plausible import question_geometry
+from rangeedge.selection import select_maps, select_strength
 
 SOON = 0.2  # seconds
 TRIES = 3  # of which the quickest counts, as other programs may run
@@ -199,6 +206,50 @@ def test_what_was_given_up_leaves_dst_alone_and_the_next_call_right():
         rangeedge.distanceTransform(z > 1.2, dst=dst)
     assert (dst == -1).all()
     assert np.array_equal(rangeedge.distanceTransform(z > 1.2, dst=dst), expected)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_frames_that_are_given_up_are_no_failures(jobs):
+    z, cancellation = noise(700), rangeedge.Cancellation()
+    results = rangeedge.mapFrames([z] * 100, functools.partial(rangeedge.detectEdges, noise=1e-3), jobs=jobs)
+    with cancellation:
+        assert not next(results).error
+        threading.Timer(0.1, cancellation.cancel).start()
+        with pytest.raises(CancelledError):
+            assert not [result.error for result in results if result.error]
+    assert cancellation.cancelled
+
+
+def test_a_batch_that_is_given_up_goes_on_where_it_stopped(tmp_path):
+    path, out, cancellation = tmp_path / "stack.npy", tmp_path / "out", rangeedge.Cancellation()
+    np.save(path, np.stack([noise(100)] * 4))
+    items = runBatch(path, out, form="png", pixelSize=1, noise=0.1)
+    with cancellation:
+        assert next(items).state == "written"
+        cancellation.cancel()
+        with pytest.raises(CancelledError):
+            next(items)
+    states = [json.loads(line)["state"] for line in (out / "manifest.jsonl").read_text().splitlines()]
+    assert states == ["written"]
+    states = [item.state for item in runBatch(path, out, form="png", pixelSize=1, noise=0.1)]
+    assert states == ["skipped", "written", "written", "written"]
+
+
+def test_what_is_no_kernel_is_given_up_as_well():
+    """Checks and selections by NumPy ask, too, between their steps."""
+    z, cancellation = noise(100), rangeedge.Cancellation()
+    frame = read_frame(z, ScanLineParams())
+    strength = rangeedge.edgeStrength(z, noise=0.1)
+    cancellation.cancel()
+    with cancellation:
+        for call in (
+            lambda: read_frame(z, ScanLineParams(invalid=0)),
+            lambda: question_geometry(z, frame, ScanLineParams()),
+            lambda: select_strength(strength, Selection()),
+            lambda: select_maps(strength.jump, strength.crease, Selection(minLength=1)),
+        ):
+            with pytest.raises(CancelledError):
+                call()
 
 
 @pytest.mark.parametrize("wait", [0.02, 0.1])

@@ -201,6 +201,18 @@ def test_labels_are_taken_and_what_is_masked_is_kept():
     assert (cleanDepth(depth, labels.astype(np.int32), K=K, radius=0).changed == 0).all()
 
 
+@pytest.mark.parametrize("width", [5, 9, 10, 14, 19])
+def test_narrow_images_are_smoothed_as_flat_ones(width):
+    rng = np.random.default_rng(width)
+    relief = 0.02 * np.sin(np.arange(240) / 6) * (np.arange(240) > 120)  # detail on one half
+    depth = 1 + relief[:, None] + rng.normal(0, 0.002, (240, width))
+    labels = np.ones(depth.shape, np.int32)
+    upright, _ = cleanDepth(depth, labels, removeFlying=False, noise=0.002)
+    flat, _ = cleanDepth(depth.T.copy(), labels.T.copy(), removeFlying=False, noise=0.002)
+    assert np.allclose(upright, flat.T, atol=1e-6)
+    assert rms(upright - 1 - relief[:, None]) < 0.8 * rms(depth - 1 - relief[:, None])
+
+
 def test_results_do_not_depend_on_threads():
     scan = kinectNoise(renderScene(demoScene(), kinectCamera()))
     threads = cv2.getNumThreads()

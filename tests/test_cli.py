@@ -15,10 +15,12 @@ from rangeedge import (
     DIR_ROWS,
     EDGE_JUMP,
     NoiseModel,
+    createScanLineDetector,
     detectEdges,
     distanceTransform,
     edgePoints,
     edgeStrength,
+    estimateNoise,
     fitSegments,
     imreadRange,
     imwriteRange,
@@ -29,6 +31,7 @@ from rangeedge import (
 from rangeedge.app.cli import main
 from rangeedge.app.lines import LINE_FILES
 from rangeedge.app.results import EDGE_FILES, REGION_FILES, find_regions, region_files, write_folder
+from rangeedge.app.texts import EPILOGUES
 
 K = np.array([[100, 0, 39.5], [0, 100, 29.5], [0, 0, 1]])
 CAMERA = ["-K", "100,100,39.5,29.5"]
@@ -276,7 +279,8 @@ class TestBadInput:
             ([*CAMERA, "--noise", "-1"], "`noise` must be"),
             ([*CAMERA, "--mask", "missing.png"], "cannot read 'missing.png'"),
             ([*CAMERA, "--calibration", "1"], "no ABW image"),
-            ([*CAMERA, "--sharpness", "1"], "unrecognized arguments: --sharpness"),
+            ([*CAMERA, "--sharpness", "1"], "unknown argument --sharpness"),
+            ([*CAMERA, "--crease-treshold=1"], "did you mean --crease-threshold?"),
         ],
     )
     def test_options(self, image, tmp_path, capsys, argv, message):
@@ -404,14 +408,15 @@ class TestHelp:
     def test_names_every_command(self, capsys):
         code, said, _ = run(capsys, "--help")
         assert code == 0
-        for command in ("detect", "segment", "batch", "demo", "bench"):
+        for command in EPILOGUES:
             assert command in said
 
-    @pytest.mark.parametrize("command", ["detect", "segment", "batch", "demo", "bench"])
+    @pytest.mark.parametrize("command", EPILOGUES)
     def test_every_option_is_explained(self, capsys, command):
         code, said, _ = run(capsys, command, "--help")
         assert code == 0
         assert "examples:" in said
+        assert "paper" not in said  # which nobody needs to have read
         assert "None" not in said.replace("None: ", "")
         assert "`" not in said.replace("`rangeedge", "").replace("`detect`", "").replace("`demo`", "")
 
@@ -495,6 +500,9 @@ def test_lines_writes_chains_and_segments(image, tmp_path, capsys):
     assert report["chains"] == len(chains) >= 4
     assert report["segments"] == len(fitSegments(chains).segments) == 4
     assert f"{report['chains']} chains, 4 segments" in said
+    assert report["understood"]["unit"] == "stored values / 1000"
+    assert report["understood"]["medianDepth"] == pytest.approx(1.5, abs=0.01)
+    assert report["noise"]["a"] == pytest.approx(estimateNoise(imreadRange(image).src, K=K).a)
     assert len((out / "chains.csv").read_text().splitlines()) == 1 + len(chains.points)
     assert cv2.imread(str(out / "lines.png")).shape == (900, 1200, 3)
 
@@ -508,6 +516,56 @@ def test_lines_takes_the_options_of_linking(image, tmp_path, capsys):
     assert not (tmp_path / "b").exists()
 
 
+@pytest.fixture
+def saved(tmp_path):
+    """Parameters of a detector, as a file."""
+    detector = createScanLineDetector()
+    detector.setK(K)
+    detector.setMinLength(50)
+    detector.setNoise(0.004)
+    detector.save(tmp_path / "detector.yml")
+    return tmp_path / "detector.yml"
+
+
+def test_saved_parameters_are_those_of_the_flags(image, saved, tmp_path, capsys):
+    given = [*CAMERA, "--min-length", "50", "--noise", "0.004"]
+    for command in ("detect", "segment", "lines"):
+        for name, options in (("file", ["--params", saved]), ("flags", given)):
+            assert run(capsys, command, image, *options, "--out", tmp_path / command / name)[0] == 0
+        files = [sorted((tmp_path / command / name).glob("[!r]*")) for name in ("file", "flags")]  # not the report
+        assert all(a.read_bytes() == b.read_bytes() for a, b in zip(*files, strict=True))
+    pictures = [run(capsys, "explain", image, "--at", "20,30", *options)[1] for options in (["--params", saved], given)]
+    assert pictures[0] == pictures[1]
+    for name, options in (("a", ["--params", saved]), ("b", [*CAMERA, "--noise", "0.004"])):
+        assert run(capsys, "clean", image, *options, "--out", tmp_path / f"{name}.png")[0] == 0
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert run(capsys, "batch", image, "--params", saved, "--out", tmp_path / "batch")[0] == 0
+    assert (tmp_path / "batch/box/thin.png").read_bytes() == (tmp_path / "detect/file/thin.png").read_bytes()
+
+
+def test_numbers_may_have_blanks_between(image, tmp_path, capsys):
+    assert run(capsys, "detect", image, "-K", "100 100 39.5 29.5", "--out", tmp_path / "a")[0] == 0
+    assert json.loads((tmp_path / "a/report.json").read_text())["options"]["K"][0] == [100, 0, 39.5]
+
+
+def test_flags_come_before_saved_parameters(image, saved, tmp_path, capsys):
+    assert run(capsys, "detect", image, "--params", saved, "--min-length", "3", "--out", tmp_path / "a")[0] == 0
+    options = json.loads((tmp_path / "a/report.json").read_text())["options"]
+    assert (options["minLength"], options["noise"], options["K"][0]) == (3, 0.004, [100, 0, 39.5])
+    assert run(capsys, "detect", image, "--params", saved, "--pixel-size", "0.01", "--out", tmp_path / "b")[0] == 0
+    assert json.loads((tmp_path / "b/report.json").read_text())["options"].keys() == {"minLength", "noise", "pixelSize"}
+
+
+def test_parameters_that_cannot_be_read(image, tmp_path, capsys):
+    (tmp_path / "other.yml").write_text("%YAML:1.0\n---\na: 1\n")
+    for name, expected in (("none.yml", "No such file"), ("other.yml", "holds no `ScanLineDetector`")):
+        code, _, told = run(capsys, "detect", image, "--params", tmp_path / name, "--out", tmp_path / "out")
+        assert code == 2
+        assert "argument --params" in told
+        assert expected in told
+    assert not (tmp_path / "out").exists()
+
+
 @pytest.mark.filterwarnings("default")
 def test_warnings_speak_of_flags(tmp_path, capsys):
     depth = np.where(np.indices((96, 128))[1] < 64, 1500, 2000).astype(np.uint16)
@@ -516,8 +574,11 @@ def test_warnings_speak_of_flags(tmp_path, capsys):
     argv = ["detect", str(tmp_path / "depth.png"), "--out", str(tmp_path / "out"), "-K", "140,140,63.5,47.5"]
     assert main([*argv, "--jump-threshold", "90"]) == 0
     lines = capsys.readouterr().err.splitlines()
-    assert lines[0].startswith("rangeedge: warning: `src` is 65535 at 100 of 12288 pixels")
-    assert "say --invalid=65535 if these have no data, --invalid=none if they have" in lines[0]
+    assert lines[0].startswith(
+        "rangeedge: warning: 100 of 12288 pixels of `src` are exactly 65535, far from the others"
+    )
+    assert "(about 1500 to 2000)" in lines[0]
+    assert "say --invalid=65535 if it does, --invalid=none if it was measured" in lines[0]
     assert lines[1].startswith("rangeedge: warning: --jump-threshold=90 exceeds")
     assert len(lines) == 2
     assert main([*argv, "--invalid", "none"]) == 0

@@ -42,6 +42,7 @@ def another(name, default):
         "jumpThreshold": 0.1 + 0.7,
         "noise": NoiseModel(1e-3, -1e-4, 1.425e-3, correlation=1.7),
         "minSignificance": 1e-300,
+        "lineSignificance": 20 / 3,
         "distCoeffs": np.array([0.1, -0.2 / 3, 1e-3, 0, 0.01]),
         "invalid": ((-9999.0, -9999.0), (8.1, np.inf)),
         "origin": (0.1, -2.0, 1 / 3),

@@ -372,3 +372,16 @@ def test_results_print_counts_and_ranges():
     assert "no data" in repr(rangeedge.RangeImage(np.full((2, 2), np.nan), {}))
     assert repr(rangeedge.NoiseModel(a=1e-3, correlation=2)) == "NoiseModel(a=0.001, correlation=2)"
     assert repr(rangeedge.ScanLineParams(K=np.eye(3))) == "ScanLineParams(K=float64 array of shape (3, 3))"
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_of_equal_creases_the_convex_one_tells_the_type(sign):
+    """In the middle of a saddle rows and columns bend by 90 degrees, one way and the other."""
+    y, x = np.mgrid[-20:21, -20:21].astype(float)
+    options = {"pixelSize": 1, "noise": 0.001, "crease": rangeedge.CREASE_MAX}
+    saddle = sign * (np.abs(x) - np.abs(y))
+    across = [rangeedge.edgeStrength(saddle, directions=d, **options) for d in (rangeedge.DIR_ROWS, rangeedge.DIR_COLS)]
+    assert {int(s.kind[20, 20]) for s in across} == {rangeedge.EDGE_CONVEX, rangeedge.EDGE_CONCAVE}
+    assert across[0].crease[20, 20] == across[1].crease[20, 20]
+    both = rangeedge.edgeStrength(saddle, directions=rangeedge.DIR_ROWS | rangeedge.DIR_COLS, **options)
+    assert both.kind[20, 20] == rangeedge.EDGE_CONVEX

@@ -63,10 +63,16 @@ def test_agrees_with_the_map(name):
                 turned = detectEdges(src, **{**options, **why.change})[y, x] > 0
             assert turned != why.edge, (x, y, why.change)
             changed[why.edge] += 1
-        if why.passes:
-            assert edges[why.passes[::-1]] > 0
-        elif not why.edge:
-            assert not edges[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].any()
+        if why.edge:
+            assert why.nearest == ()
+        elif why.nearest and why.nearest[0].edge:
+            rows, cols = np.nonzero(edges)
+            nearest = why.nearest[0]
+            assert edges[nearest.y, nearest.x] > 0
+            assert nearest.distance == np.hypot(rows - y, cols - x).min() == np.hypot(nearest.y - y, nearest.x - x)
+        else:
+            rows, cols = np.nonzero(edges)
+            assert np.hypot(rows - y, cols - x).min() > 24
     assert changed[True] > 0.9 * np.count_nonzero(edges) / 4 * 0.8
 
 
@@ -109,6 +115,21 @@ def test_samples_and_curves_of_a_roof():
     assert (cut.x, cut.y) == pytest.approx((30.3, 20))
     assert cut.crease == pytest.approx(2 * np.degrees(np.arctan(0.2)), abs=1e-5)
     assert (cut.before, cut.after) == ((30, 20), (31, 20))
+
+
+def test_names_the_nearest_edge_and_a_nearer_candidate():
+    surface = np.zeros((40, 80))
+    surface[:, 20:] = 0.5  # the jump, seen from the nearer side
+    surface[:, 40:] += 0.1 * np.arange(40)  # a crease of 5.7 degrees, below the threshold
+    why = explainPixel(surface, 35, 20, noise=0.001)
+    candidate, edge = why.nearest[1], why.nearest[0]
+    assert (edge.x, edge.y, edge.distance, edge.edge, edge.jump) == (19, 20, 16, True, pytest.approx(0.5, abs=1e-6))
+    assert candidate.edge is False
+    assert abs(candidate.x - 39.5) <= 0.5
+    assert candidate.crease == pytest.approx(np.degrees(np.arctan(0.1)), abs=0.01)
+    assert "The nearest edge is (19, 20), 16 pixels away: a jump of 0.5, jump occluding." in str(why)
+    assert "The nearest candidate, itself no edge, is (" in str(why)
+    assert explainPixel(np.ones((40, 80)), 35, 20, noise=0.001).nearest == ()
 
 
 def test_every_stage_by_hand():

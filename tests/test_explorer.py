@@ -52,6 +52,12 @@ def test_parameters_are_those_of_the_detector(session):
     for name in (*SLIDERS, *SWITCHES):
         session.change(name, DETECTION[name].default)
     assert session.options == {}
+    for name in SLIDERS:  # as when they are put back
+        session.change(name, session.value(name))
+    assert session.options == {}
+    session.change("minSignificance", 0.0)
+    expected = rangeedge.detectEdges(src, **geometry, minSignificance=0)
+    assert np.array_equal(session.picture("thin map")[..., 0], expected)
 
 
 def test_exports_make_the_same_edges(session, tmp_path, monkeypatch):
@@ -70,6 +76,32 @@ def test_exports_make_the_same_edges(session, tmp_path, monkeypatch):
     assert detector.getCreaseThreshold() == 20
 
 
+def test_what_a_parameter_leaves_as_it_was_is_kept(session):
+    strength = session.results.strength
+    session.change("creaseThreshold", 50.0)
+    assert session.results.strength is strength
+    expected = rangeedge.detectEdges(session.image.src, **session.geometry, creaseThreshold=50)
+    assert np.array_equal(session.results.edges, expected)
+    session.change("epsFactor", 5.0)
+    assert session.results.strength is not strength
+
+
+def test_everyone_has_a_session_of_their_own(session):
+    session.change("maxGap", 3)
+    other = session.copy()
+    other.change("maxGap", 20)
+    assert (session.value("maxGap"), other.value("maxGap")) == (3, 20)
+
+
+def test_missing_camera_is_noted(session):
+    assert session.notes == []
+    session.place("", "", height_map=False)
+    assert len(session.notes) == 1
+    assert "give K" in session.notes[0]
+    session.place("525, 525, 319.5, 239.5", "", height_map=False)
+    assert session.notes == []
+
+
 def test_wrong_uploads_change_nothing(session):
     before = session.picture("edges")
     colour = cv2.imencode(".png", np.zeros((20, 30, 3), np.uint8))[1].tobytes()
@@ -86,12 +118,19 @@ def test_wrong_uploads_change_nothing(session):
 def test_geometry_as_typed(session):
     with pytest.raises(rangeedge.error):
         session.place("525, 525", "", height_map=False)
-    with pytest.raises(rangeedge.error, match="numbers"):
+    with pytest.raises(rangeedge.error, match="`K` must be four numbers"):
         session.place("a, b", "", height_map=False)
+    with pytest.raises(rangeedge.error, match="depthFactor"):
+        session.place("", "", height_map=False, depth_factor="many")
     session.place("500, 500, 320, 240", "", height_map=False)
-    assert np.allclose(session.geometry["K"], (500, 500, 320, 240))
+    assert session.typed("K") == "500, 500, 320, 240"
     session.place("", "0.002", height_map=True)
     assert session.geometry == {"pixelSize": 0.002, "heightMap": True}
+    session.place("500 500 320 240", "", height_map=False, depth_factor="5000", invalid="0, 65535")
+    assert [session.typed(name) for name in ("K", "pixelSize", "depthFactor", "invalid")] == [
+        "500, 500, 320, 240", "", "5000", "0, 65535",
+    ]  # fmt: skip
+    assert session.geometry["depthFactor"] == 5000
 
 
 def test_command_says_what_is_missing(monkeypatch, capsys):
@@ -140,7 +179,7 @@ def _open(port):
         return False
 
 
-def _wait(condition, seconds=60):
+def _wait(condition, seconds=120):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         found = condition()
@@ -179,7 +218,7 @@ def test_page(page, tmp_path):
     assert first.startswith("640 x 480, ")
     views = driver.find_elements("css selector", ".view img")
     assert len(views) == 4
-    assert all(view.get_attribute("src").startswith("data:image/png") for view in views)
+    assert all(view.get_attribute("src").startswith("data:image/jpeg") for view in views)
 
     # A slider changes the edges, the program that the page shows, and nothing else.
     slider = driver.find_element("id", "creaseThreshold")
@@ -202,7 +241,16 @@ def test_page(page, tmp_path):
     ActionChains(driver).send_keys(Keys.ESCAPE).perform()
     _wait(lambda: not driver.find_elements("css selector", ".q-dialog__backdrop"))
 
+    # The menu chooses views.
+    driver.find_element("id", "views").click()
+    _wait(lambda: [box for box in driver.find_elements("css selector", ".q-menu .q-checkbox") if box.is_displayed()])
+    status = page.after(driver.find_elements("css selector", ".q-menu .q-checkbox")[2].click)
+    assert "5 views" in status
+    ActionChains(driver).send_keys(Keys.ESCAPE).perform()
+    _wait(lambda: not driver.find_elements("css selector", ".q-menu"))
+
     # The wheel zooms all views together.
+    image = driver.find_element("css selector", "#view-edges img, #view-edges")
     ActionChains(driver).scroll_from_origin(_origin(image), 0, -300).perform()
     zoom = "return getComputedStyle(document.documentElement).getPropertyValue('--zoom')"
     _wait(lambda: float(driver.execute_script(zoom) or 1) > 1)

@@ -6,6 +6,7 @@ import pytest
 
 import rangeedge
 from rangeedge import DIR_COLS, DIR_ROWS, flyingPixels
+from rangeedge.synthetic import pinholeCamera, plane, renderScene, sphere
 
 NAN = np.nan
 K = np.array([[250.0, 0, 59.5], [0, 250, 39.5], [0, 0, 1]])
@@ -49,6 +50,18 @@ def test_a_slanted_face_of_a_few_pixels_is_a_surface_where_it_is_wide_enough_in_
     for unknown in ({}, {"pixelSize": 1}):  # no scale, no angle
         assert flyingPixels(1 + 0.02 * ramp, noise=0.0001, **unknown)[:, 60:62].all()
     assert not flyingPixels(1 + 0.02 * ramp, noise=0.0001, pixelSize=0.004).any()
+
+
+def test_the_limb_of_a_round_surface_is_none():
+    camera = pinholeCamera(K, (120, 80))
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        scene = [sphere((*rng.uniform(-0.04, 0.04, 2), 0.8), 0.09), plane((0, 0, 0.84), (0.3, 0.5, -1))]
+        assert not flyingPixels(renderScene(scene, camera).depth + rng.normal(0, 0.0002, U.shape), K=K).any()
+    # A step between flat surfaces keeps its mixed pixels, also where a row of them begins.
+    z = np.where(U < 60, 0.6, 0.75) + np.random.default_rng(0).normal(0, 0.0003, U.shape)
+    z[5:, 60] = 0.66
+    assert (flyingPixels(z, K=K)[6:-5, 60] > 0).all()
 
 
 def test_thin_objects_are_none():

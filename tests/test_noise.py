@@ -164,6 +164,16 @@ def test_planes_rounded_to_millimetres_are_planes(angle, kind):
                 assert estimateNoise(src, K=K)(z0) > 0.95 * 0.001 / np.sqrt(12)
 
 
+@pytest.mark.parametrize("unit", [256, 100])
+@pytest.mark.parametrize("angle", [16, 20, 30, 40])
+def test_planes_rounded_coarsely_are_planes(unit, angle):
+    """Near the camera the same value is seen over many pixels, and over few farther away."""
+    for z0 in (0.3, 0.5, 1.0, 2.0):
+        for azimuth in (0, 27):
+            src = np.rint(unit * tilted(z0, angle, azimuth)).astype(np.uint16)
+            assert not detectEdges(src, K=K, depthFactor=unit).any()
+
+
 HOLES = {
     "checkerboard": lambda v, u: (u + v) % 2 > 0,
     "comb": lambda v, u: u % 2 > 0,
@@ -214,7 +224,7 @@ def test_an_image_without_noise_is_silent():
         assert cv2.dilate(edges.astype(np.uint8), np.ones((5, 5)))[(truth > 0) & (truth < 4)].mean() > 0.99
 
 
-@pytest.mark.filterwarnings("ignore:.*far from all others")
+@pytest.mark.filterwarnings("ignore:.*far from the others")
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 @pytest.mark.parametrize("geometry", [dict(), dict(K=K), dict(heightMap=True)])

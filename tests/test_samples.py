@@ -241,6 +241,22 @@ def test_tuning_loses_edges_when_everything_must_be_certain(tmp_path, capsys):
     assert cv2.imread(str(tmp_path / "tune.png")).std() > 10
 
 
+def test_tuning_an_image_of_ones_own_counts_edges_by_kind(tmp_path, capsys):
+    pytest.importorskip("matplotlib")
+    step = np.where(np.arange(80) < 30, 900, 1200) * np.ones((60, 1))
+    cv2.imwrite(str(tmp_path / "step.png"), step.astype(np.uint16))
+    run("tune", tmp_path / "step.png", "-K", "100,100,39.5,29.5", "--out", tmp_path)
+    counted = [line.split()[1:] for line in capsys.readouterr().out.splitlines() if "convex" in line]
+    assert len(counted) == 28
+    assert counted[2] == ["jump", "60", "convex", "0", "concave", "0"]  # of a straight jump of 60 rows
+    assert (tmp_path / "tune.png").exists()
+    edges = np.zeros((60, 80), np.uint8)
+    edges[:, 29] = 255
+    cv2.imwrite(str(tmp_path / "truth.png"), edges)
+    run("tune", tmp_path / "step.png", "-K", "100,100,39.5,29.5", "--truth", tmp_path / "truth.png", "--out", tmp_path)
+    assert "precision 1  recall 1\n" in capsys.readouterr().out
+
+
 def test_elevation_has_walls_ridges_and_toes(tmp_path, capsys):
     run("elevation", "--out", tmp_path)
     said = dict(line.split(": ") for line in capsys.readouterr().out.splitlines() if line.endswith("pixels"))

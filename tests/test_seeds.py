@@ -117,6 +117,26 @@ def test_ways_uphill_that_cross_the_rows_of_every_thread(seed, threads):
     assert as_sets(markers) == oracle(distance, 2.0, 0.8)
 
 
+@pytest.mark.parametrize("threads", [1, 2, 5])
+@pytest.mark.parametrize("seed", range(3))
+def test_wrap_knows_no_first_column(seed, threads):
+    # Few values, so that plateaus and ties lie across the seam; large enough for every thread to get some rows.
+    rng = np.random.default_rng(seed)
+    smooth = cv2.GaussianBlur(rng.random((64, 301)), (0, 0), 3, borderType=cv2.BORDER_REFLECT)
+    distance = np.round(60 * (smooth - smooth.min()))[:, 20:-20].astype(np.float32)
+    before = cv2.getNumThreads()
+    cv2.setNumThreads(threads)
+    try:
+        found = [
+            as_sets(relabelled(np.roll(extractSeeds(np.roll(distance, k, 1), wrap=True)[1], -k, 1)))
+            for k in (0, 1, 2, 77)
+        ]
+    finally:
+        cv2.setNumThreads(before)
+    assert len(found[0]) > 2
+    assert all(sets == found[0] for sets in found[1:])
+
+
 def test_threads_do_not_matter():
     distance = distanceTransform(random_edges(7, (300, 400), 0.002))
     threads = cv2.getNumThreads()

@@ -11,6 +11,8 @@ from rangeedge import (
     EDGE_OCCLUDING,
     EdgeStrength,
     NoiseModel,
+    ScanLineParams,
+    createScanLineDetector,
     detectEdges,
     edgePoints,
     edgeStrength,
@@ -106,6 +108,20 @@ def test_the_detector_leaves_lines_out_that_are_not_significant():
     assert detectEdges(z, **options).any()
     assert detectEdges(z, lineSignificance=14.0, **options).any()
     assert not detectEdges(z, lineSignificance=200.0, **options).any()
+
+
+def test_all_lines_stay_where_every_candidate_does_unless_a_significance_is_asked_for():
+    z = 1 + 0.002 * np.abs(U - 29.6) * np.ones((50, 1)) + np.random.default_rng(2).normal(0, 0.006, (50, 60))
+    known = dict(noise=0.006, pixelSize=0.002)
+    for params, meant, other in (
+        (ScanLineParams.paper(**known), 0, 20),
+        (ScanLineParams(minSignificance=0, **known), 0, 20),
+        (ScanLineParams(minSignificance=1, **known), 20, 0),
+    ):
+        detector = createScanLineDetector(params)
+        edges = detector.detectEdges(z, creaseThreshold=20)
+        assert np.array_equal(edges, detector.detectEdges(z, creaseThreshold=20, lineSignificance=meant))
+        assert not np.array_equal(edges, detector.detectEdges(z, creaseThreshold=20, lineSignificance=other))
 
 
 # Splitting.

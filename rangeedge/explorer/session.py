@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import tempfile
+import warnings
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
@@ -14,20 +15,22 @@ import numpy as np
 
 from .._check import described, error
 from .._option import parsed
-from ..chains import linkEdges
+from ..chains import link_frame
 from ..constants import SALIENCE_ADDITIVE
-from ..detector import createScanLineDetector, run_detector
+from ..detector import createScanLineDetector, selected, thin_lines
 from ..distance import distanceTransform, salienceDistanceTransform
 from ..draw import colorizeDistance, drawChains, drawEdges, drawRegions
-from ..edges import EdgeStrength
+from ..draw.relief import relief_of, subdued
+from ..edges import EdgeStrength, measure_strength
 from ..explain import Explanation, explain
 from ..io import RangeImage, imreadRange
 from ..noise import measured_frame
-from ..options import DETECTION, GEOMETRY, Growing, ScanLineParams, Selection
+from ..options import DETECTION, GEOMETRY, Growing, Linking, ScanLineParams, Selection
+from ..plausible import RangeEdgeWarning
 from ..regions import seeded_regions
 from ..selection import overallStrength, strengthImage
 
-SLIDERS = {  # name: least, largest, step
+SLIDERS = {  # name: least, largest, step; first those of `Selection`
     "jumpThreshold": (0.0, 1.0, 0.005),
     "creaseThreshold": (0.0, 90.0, 1.0),
     "hysteresis": (0.1, 1.0, 0.05),
@@ -45,31 +48,40 @@ SWITCHES = ("boundaryEdges", "dynamic", "shadowEdges")
 class Session:
     """One user's image and parameters."""
 
-    def __init__(self, image: RangeImage, title: str) -> None:
+    def __init__(self, image: RangeImage, title: str, options: Mapping[str, Any]) -> None:
         self.title = title
-        self.options: dict[str, Any] = {}
+        self.options = dict(options)
         self.use(image)
 
     @classmethod
-    def of_file(cls, path: str | os.PathLike[str], **geometry: Any) -> Session:
+    def of_file(cls, path: str | os.PathLike[str], **options: Any) -> Session:
         """Of an image that is a file here."""
-        return cls(imreadRange(path).withGeometry(**geometry), Path(path).name)
+        own = {name: options.pop(name) for name in list(options) if name in (*SLIDERS, *SWITCHES)}
+        return cls(imreadRange(path).withGeometry(**options), Path(path).name, own)
 
     @classmethod
-    def of_scene(cls) -> Session:
+    def of_scene(cls, **options: Any) -> Session:
         """Of the scene of `rangeedge demo`."""
         from ..app.demo import RenderedScene
 
         scene = RenderedScene()
-        return cls(RangeImage(scene.src, scene.geometry), scene.title)
+        return cls(RangeImage(scene.src, scene.geometry), scene.title, options)
+
+    def copy(self) -> Session:
+        """The same for another user."""
+        return Session(self.image, self.title, self.options)
 
     def use(self, image: RangeImage) -> None:
         """Take an image; on an error everything stays as it was."""
-        params, _ = parsed({**image.geometry, **self.options}, ScanLineParams, Selection)
-        frame = measured_frame(image.src, params)
+        params, selection = parsed({**image.geometry, **self.options}, ScanLineParams, Selection)
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always", RangeEdgeWarning)
+            frame = measured_frame(image.src, params)
+        self.notes = [str(w.message) for w in told if issubclass(w.category, RangeEdgeWarning)]
         self.image, self.noise, self._frame = image, frame.noise, frame
-        self._results = Results(frame, params, Selection(**self._own(Selection)))
-        self.relief = drawEdges(image.src, np.zeros(frame.shape, np.uint8), **self.geometry)
+        self.results = Results(frame, params, selection)
+        self.bright = relief_of(frame.depth)
+        self.relief = subdued(self.bright)
 
     def upload(self, name: str, content: bytes) -> None:
         """Take what a user has dropped."""
@@ -81,28 +93,36 @@ class Session:
             self.use(image if image.geometry else image.withGeometry(**known) if _fits(image, self.image) else image)
         self.title = name
 
-    def place(self, camera: str, pixel_size: str, *, height_map: bool) -> None:
-        """Take a geometry as it is typed; on an error it stays as it was."""
-        given: dict[str, Any] = {}
-        if camera.strip():
-            given["K"] = _numbers(camera)
-        elif pixel_size.strip():
-            sizes = _numbers(pixel_size)
-            given["pixelSize"] = sizes[0] if len(sizes) == 1 else sizes
-        if height_map:
-            given["heightMap"] = True
-        kept = {n: v for n, v in self.image.geometry.items() if n in ("depthFactor", "invalid")}
-        self.use(RangeImage(self.image.src, {**kept, **given}))
+    def place(
+        self, camera: str, pixel_size: str, *, height_map: bool, depth_factor: str = "", invalid: str = ""
+    ) -> None:
+        """Take a geometry as it is typed, in the words of the command line; on an error it stays as it was."""
+        texts = {"K": camera, "pixelSize": "" if camera.strip() else pixel_size}
+        texts |= {"depthFactor": depth_factor, "invalid": invalid}
+        given = {name: _read(name, text) for name, text in texts.items() if text.strip()}
+        self.use(RangeImage(self.image.src, given | ({"heightMap": True} if height_map else {})))
+
+    def typed(self, name: str) -> str:
+        """An option of the geometry as it would be typed."""
+        value = self.geometry.get(name)
+        if value is None:
+            return ""
+        numbers = np.asarray(value, np.float64).ravel()
+        if name == "K" and numbers.size == 9:
+            numbers = numbers[[0, 4, 2, 5]]
+        return ", ".join(f"{number:g}" for number in numbers) or "none"  # invalid=()
 
     def change(self, name: str, value: Any) -> None:
         """Set a parameter."""
-        default = DETECTION[name].default
-        if value == default or (name == "jumpThreshold" and not value):
+        if value is None or value == self._usual(name):
             self.options.pop(name, None)
         else:
             self.options[name] = value
         params, selection = parsed({**self.geometry, **self.options}, ScanLineParams, Selection)
-        self._results = Results(self._frame.with_noise(self.noise), params, selection)
+        if params == self.results.params:
+            self.results = self.results.selecting(selection)
+        else:
+            self.results = Results(self._frame.with_noise(self.noise), params, selection)
 
     @property
     def geometry(self) -> dict[str, Any]:
@@ -111,20 +131,26 @@ class Session:
 
     def value(self, name: str) -> Any:
         """What a parameter is."""
-        value = self.options.get(name, DETECTION[name].default)
-        return 0.0 if value is None else value
+        return self.options.get(name, self._usual(name))
 
-    def picture(self, view: str) -> np.ndarray:
+    def _usual(self, name: str) -> Any:
+        """What it is by default, None in numbers."""
+        default = DETECTION[name].default
+        if default is not None:
+            return default
+        return Selection().of(self.results.params).lineSignificance if name == "lineSignificance" else 0.0
+
+    def picture(self, view: str, results: Results | None = None) -> np.ndarray:
         """One of `VIEWS`, as large as the image."""
-        return VIEWS[view](self, self._results)
+        return VIEWS[view](self, results or self.results)
 
     def edge_count(self) -> int:
         """How many pixels are edges."""
-        return int(np.count_nonzero(self._results.edges))
+        return int(np.count_nonzero(self.results.edges))
 
     def explanation(self, x: int, y: int) -> Explanation:
         """Why a pixel is an edge or none."""
-        results = self._results
+        results = self.results
         return explain(results.frame, results.params, results.selection, x, y, 24)
 
     def python(self) -> str:
@@ -144,9 +170,6 @@ class Session:
             detector.save(path)
             return path.read_bytes()
 
-    def _own(self, kind: Any) -> dict[str, Any]:
-        return {name: value for name, value in self.options.items() if name in kind.options}
-
 
 class Results:
     """What follows from the parameters, each computed when it is looked at."""
@@ -154,17 +177,20 @@ class Results:
     def __init__(self, frame: Any, params: ScanLineParams, selection: Selection) -> None:
         self.frame, self.params, self.selection = frame, params, selection
 
+    def selecting(self, selection: Selection) -> Results:
+        """With other options of selection, which leave the strengths as they are."""
+        other = Results(self.frame, self.params, selection)
+        if "strength" in vars(self):
+            other.strength = self.strength
+        return other
+
     @cached_property
-    def found(self) -> tuple[np.ndarray, EdgeStrength]:
-        return run_detector(self.frame, self.params, self.selection)
-
-    @property
-    def edges(self) -> np.ndarray:
-        return self.found[0]
-
-    @property
     def strength(self) -> EdgeStrength:
-        return self.found[1]
+        return measure_strength(self.frame, self.params)
+
+    @cached_property
+    def edges(self) -> np.ndarray:
+        return thin_lines(self.frame, selected(self.frame, self.strength, self.selection.of(self.params)))
 
     @cached_property
     def distance(self) -> np.ndarray:
@@ -186,12 +212,11 @@ def _edges(session: Session, results: Results) -> np.ndarray:
 
 
 def _chains(session: Session, results: Results) -> np.ndarray:
-    options = {**session.geometry, **session.options, "noise": session.noise}
-    return drawChains(session.relief, linkEdges(session.image.src, **options))
+    return drawChains(session.relief, link_frame(results.frame, results.params, results.selection, Linking()))
 
 
 VIEWS: Mapping[str, Callable[[Session, Results], np.ndarray]] = {
-    "depth": lambda session, _: session.relief,
+    "depth": lambda session, _: session.bright,
     "edges": _edges,
     "kinds": lambda session, r: drawEdges(session.relief // 3, r.strength.kind, r.strength.kind),
     "crease": lambda _, r: cv2.cvtColor(strengthImage(r.strength.crease, 64), cv2.COLOR_GRAY2BGR),
@@ -204,13 +229,18 @@ VIEWS: Mapping[str, Callable[[Session, Results], np.ndarray]] = {
     "regions": lambda session, r: drawRegions(r.regions[1], session.relief, 0.7),
     "chains": _chains,
 }
+SHARING = (  # views whose results follow from each other, in the order in which they are quick to draw
+    ("edges", "thin map", "distance", "kinds", "crease", "depth", "salience"),
+    ("seeds", "regions"),
+    ("chains",),
+)
 
 
-def _numbers(text: str) -> list[float]:
+def _read(name: str, text: str) -> Any:
     try:
-        return [float(word) for word in text.replace(",", " ").split()]
-    except ValueError:
-        raise error(f"must be numbers, got {text!r}") from None
+        return GEOMETRY[name].read(text.strip())
+    except ValueError as problem:
+        raise error(f"`{name}` {getattr(problem, 'err', problem)}") from None
 
 
 def _fits(image: RangeImage, other: RangeImage) -> bool:
@@ -219,7 +249,10 @@ def _fits(image: RangeImage, other: RangeImage) -> bool:
 
 
 def _written(value: Any) -> str:
-    """A value as a program has it."""
+    """A value as a program has it, a camera without skew by its four numbers."""
     if isinstance(value, np.ndarray):
+        if value.shape == (3, 3):
+            plain = np.array([[value[0, 0], 0, value[0, 2]], [0, value[1, 1], value[1, 2]], [0, 0, 1]])
+            value = value[[0, 1, 0, 1], [0, 1, 2, 2]] if np.array_equal(value, plain) else value
         return repr(value.tolist())
     return repr(value) if isinstance(value, (bool, int, float, str, tuple, list, type(None))) else described(value)

@@ -15,12 +15,15 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, NamedTuple
 
 import cv2
 
+from .. import _core
+
+_PATIENCE = 0.05  # seconds between questions whether the wait is given up
 _AHEAD = 3  # tasks a worker that are in flight: one at work, one waiting, one whose result waits for those before
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 
@@ -39,6 +42,8 @@ def attempt(call: Callable[[Any], Any], task: Any) -> Outcome:
     start = time.perf_counter()
     try:
         return Outcome(call(task), "", time.perf_counter() - start)
+    except CancelledError:
+        raise
     except Exception as problem:  # the other tasks go on
         message = problem.msg if isinstance(problem, cv2.error) else f"{type(problem).__name__}: {problem}"
         return Outcome(None, message, time.perf_counter() - start, _is_full(problem))
@@ -71,7 +76,7 @@ def run_local(call: Callable[[Any], Any], tasks: Iterable[Any], jobs: int) -> It
                 return
             task, future = waiting.popleft()
             try:
-                outcome = future.result()
+                outcome = _awaited(future)
             except BrokenProcessPool:
                 pool.shutdown(wait=False, cancel_futures=True)
                 suspects = [(task, future), *waiting]
@@ -93,6 +98,13 @@ def _submitted(pool: ProcessPoolExecutor, call: Callable[[Any], Any], task: Any)
         return future
 
 
+def _awaited(future: Future[Outcome]) -> Outcome:
+    """The result, unless the wait for it is given up."""
+    while not wait([future], _PATIENCE).done:
+        _core.checkpoint()
+    return future.result()
+
+
 def _alone(call: Callable[[Any], Any], task: Any, future: Future[Outcome]) -> Outcome:
     """The outcome that a task had when its pool broke, or else has in a pool of its own."""
     if future.done() and not future.cancelled() and future.exception() is None:
@@ -100,7 +112,7 @@ def _alone(call: Callable[[Any], Any], task: Any, future: Future[Outcome]) -> Ou
     start = time.perf_counter()
     pool = _pool(1)
     try:
-        return pool.submit(attempt, call, task).result()
+        return _awaited(pool.submit(attempt, call, task))
     except BrokenProcessPool:
         return Outcome(None, "the worker process was killed, twice", time.perf_counter() - start)
     finally:

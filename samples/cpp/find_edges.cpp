@@ -26,10 +26,11 @@ int main() {
 
     // Tolerance 0: `eps_factor` times the noise. All four directions, least squares, jumps and creases beyond 4 sigma.
     const rangeedge::ScanLineOptions options{0, 2.5, 15, false, false, true, 2, 1, 6, true, false, 5, 4};
-    const auto candidates = rangeedge::find_candidates(frame, options, 2);
+    rangeedge::Team team(2);
+    const auto candidates = rangeedge::find_candidates(frame, options, team);
     std::vector<float> jump(height.size()), crease(height.size()), significance(height.size());
     std::vector<std::uint8_t> kind(height.size());
-    rangeedge::combine(candidates, jump.data(), crease.data(), kind.data(), significance.data());
+    rangeedge::combine(candidates, {jump.data(), crease.data(), kind.data(), significance.data()}, team);
 
     int edges = 0;
     for (int i = 0; i < rows * cols; ++i) edges += jump[i] > 0.25f;

@@ -9,6 +9,8 @@
 //
 // Where distances are short, looking at every column within reach is quicker than an envelope: window.hpp.
 //
+// What stands in the output in between, the row of every pixel's source in its own column, takes no memory of its own.
+//
 // Pixels may be taller than wide: lengths are in pixel widths, and squares along columns count `aspect` times. Where
 // the image wraps around, half a row of parabolas is repeated on either side.
 //
@@ -19,7 +21,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <memory>
 #include <type_traits>
 #include <vector>
 
@@ -127,21 +128,27 @@ private:
     std::array<double, sizeof(T) == 1 ? 256 : 0> of_{};
 };
 
-// Columns that one thread treats together: whole cache lines of a row.
-constexpr int strip = 64;
+// Columns that one thread treats together: whole cache lines of a row, and more of them where an image is so wide that
+// there are strips enough, since rows are read faster the longer they are.
+constexpr int least_strip = 64, most_strip = 512;
+
+int strip_width(int cols, int threads) {
+    constexpr int strips = 4;  // of a thread
+    return std::clamp(cols / (strips * threads) / least_strip * least_strip, least_strip, most_strip);
+}
 
 // rows[p]: the row of the source in p's own column that is nearest to p; -1 for none. Here without penalties: the last
 // source above or the next below, of which the upper one where both are equally near.
 void nearest_in_columns(const Edges& sources, const Grid& grid, int first, int last, std::int32_t* rows) {
     constexpr std::int32_t none = std::numeric_limits<std::int32_t>::min() / 2;
-    std::int32_t nearest[strip];
-    std::fill_n(nearest, strip, none);
+    std::int32_t nearest[most_strip];
+    std::fill_n(nearest, last - first, none);
     for (int y = 0; y < grid.rows; ++y) {
         const std::uint8_t* edges = sources.edges + grid.index(y, first);
         std::int32_t* row = rows + grid.index(y, first);
         for (int c = 0; c < last - first; ++c) row[c] = nearest[c] = edges[c] ? y : nearest[c];
     }
-    std::fill_n(nearest, strip, -none);
+    std::fill_n(nearest, last - first, -none);
     for (int y = grid.rows - 1; y >= 0; --y) {
         std::int32_t* row = rows + grid.index(y, first);
         for (int c = 0; c < last - first; ++c) {
@@ -154,7 +161,7 @@ void nearest_in_columns(const Edges& sources, const Grid& grid, int first, int l
 
 template <class Sources>
 void nearest_in_columns(const Sources& sources, const Grid& grid, int first, int last, std::int32_t* rows) {
-    std::vector<Envelope> envelopes(strip);
+    std::vector<Envelope> envelopes(static_cast<std::size_t>(last - first));
     const auto envelope = [&](int c) -> Envelope& { return envelopes[static_cast<std::size_t>(c)]; };
     for (int c = 0; c < last - first; ++c) envelope(c).reset(grid.rows, grid.aspect());
     for (int y = 0; y < grid.rows; ++y)
@@ -162,8 +169,8 @@ void nearest_in_columns(const Sources& sources, const Grid& grid, int first, int
             const std::size_t p = grid.index(y, x);
             if (sources.is_source(p)) envelope(x - first).push(y, sources.height(p), y);
         }
-    std::int32_t current[strip];
-    int next[strip] = {}, change[strip];  // the next piece and the row at which it begins
+    std::int32_t current[most_strip];
+    int next[most_strip] = {}, change[most_strip];  // the next piece and the row at which it begins
     for (int c = 0; c < last - first; ++c) {
         current[c] = -1;
         change[c] = envelope(c).size() > 0 ? 0 : grid.rows;
@@ -180,14 +187,13 @@ void nearest_in_columns(const Sources& sources, const Grid& grid, int first, int
     }
 }
 
-// A row of distances and labels from the nearest source of every column.
+// A row of distances and labels from `rows`, the row of the nearest source in every column.
 template <class Sources>
 void nearest_across_columns(const Sources& sources, const Grid& grid, int y, const std::int32_t* rows,
                             Envelope& envelope, Array<double>& squared, float* distance, std::int32_t* labels) {
-    const std::size_t row = grid.index(y, 0);
     const double aspect = grid.aspect();
     const auto push = [&](int x, int position) {
-        const int source = rows[row + static_cast<std::size_t>(x)];
+        const int source = rows[x];
         if (source < 0) return;
         const double dy = y - source;
         const std::size_t label = grid.index(source, x);
@@ -199,8 +205,8 @@ void nearest_across_columns(const Sources& sources, const Grid& grid, int y, con
     for (int x = 0; x < grid.cols; ++x) push(x, x);
     for (int x = 0; x < beyond; ++x) push(x, x + grid.cols);
     if (envelope.size() == 0) {
-        std::fill_n(distance + row, grid.cols, std::numeric_limits<float>::infinity());
-        if (labels) std::fill_n(labels + row, grid.cols, -1);
+        std::fill_n(distance, grid.cols, std::numeric_limits<float>::infinity());
+        if (labels) std::fill_n(labels, grid.cols, -1);
         return;
     }
     for (std::ptrdiff_t k = 0; k < envelope.size(); ++k) {
@@ -210,14 +216,14 @@ void nearest_across_columns(const Sources& sources, const Grid& grid, int y, con
             const double dx = x - piece.position;
             squared[x] = dx * dx + piece.height;
         }
-        if (labels) std::fill(labels + row + piece.start, labels + row + end, piece.label);
+        if (labels) std::fill(labels + piece.start, labels + end, piece.label);
     }
-    float* to = distance + row;
-    for (int x = 0; x < grid.cols; ++x) to[x] = static_cast<float>(grid.width * std::sqrt(squared[x]));
+    for (int x = 0; x < grid.cols; ++x) distance[x] = static_cast<float>(grid.width * std::sqrt(squared[x]));
 }
 
 // What a thread needs for a row.
 struct RowBuffers {
+    Array<std::int32_t> rows;
     Envelope envelope;
     Array<double> squared;
     Window window;
@@ -225,25 +231,30 @@ struct RowBuffers {
 
 template <class Sources>
 void nearest_by_sum(const Sources& sources, const Grid& grid, float* distance, std::int32_t* labels, int threads) {
-    // Left as it comes: every thread touches its part first.
-    const std::unique_ptr<std::int32_t[]> rows(new std::int32_t[grid.index(grid.rows, 0)]);
-    const int strips = (grid.cols - 1) / strip + 1;
+    static_assert(sizeof(float) == sizeof(std::int32_t));
+    std::int32_t* const rows = reinterpret_cast<std::int32_t*>(distance);
+    const int strip = strip_width(grid.cols, threads), strips = (grid.cols - 1) / strip + 1;
     constexpr int bunch = 8;  // rows
     Team team(std::min(threads, std::max(strips, grid.rows / bunch)));
     parallel_each(strips, team, [&](int s, int) {
-        nearest_in_columns(sources, grid, s * strip, std::min(grid.cols, (s + 1) * strip), rows.get());
+        nearest_in_columns(sources, grid, s * strip, std::min(grid.cols, (s + 1) * strip), rows);
     });
     std::vector<RowBuffers> buffers(static_cast<std::size_t>(team.size()));
-    for (RowBuffers& b : buffers) b.squared.resize(grid.cols);
+    for (RowBuffers& b : buffers) {
+        b.rows.resize(grid.cols);
+        b.squared.resize(grid.cols);
+    }
     const bool plain = std::is_same_v<Sources, Edges> && !labels && grid.height == grid.width;
     parallel_each((grid.rows - 1) / bunch + 1, team, [&](int b, int thread) {
         RowBuffers& own = buffers[static_cast<std::size_t>(thread)];
         bool short_ones = plain;  // in the row above: the next one is likely to be alike
         for (int y = b * bunch; y < std::min(grid.rows, (b + 1) * bunch); ++y) {
             const std::size_t row = grid.index(y, 0);
-            short_ones = short_ones && own.window.distances(rows.get() + row, y, grid, distance + row);
+            std::copy_n(rows + row, grid.cols, own.rows.data());
+            short_ones = short_ones && own.window.distances(own.rows.data(), y, grid, distance + row);
             if (!short_ones)
-                nearest_across_columns(sources, grid, y, rows.get(), own.envelope, own.squared, distance, labels);
+                nearest_across_columns(sources, grid, y, own.rows.data(), own.envelope, own.squared, distance + row,
+                                       labels ? labels + row : nullptr);
         }
     });
 }

@@ -38,6 +38,7 @@ std::size_t at(int index) { return static_cast<std::size_t>(index); }
 // The sign of d2a / a^2 - d2b / b^2 without rounding, for integers d2a, d2b below 2^53 and a, b of 24 bits: squares of
 // such are exact, and fma gives what rounding takes from a product.
 int compare_exactly(double d2a, double a, double d2b, double b) {
+    if (a == b) return (d2a > d2b) - (d2a < d2b);
     const double left = d2a * (b * b), right = d2b * (a * a);
     if (left != right) return left < right ? -1 : 1;
     const double left_rest = std::fma(d2a, b * b, -left), right_rest = std::fma(d2b, a * a, -right);
@@ -120,12 +121,11 @@ private:
             const double row = tile.y + p / tile_size, col = tile.x + p % tile_size;
             if (second[p] <= close) number = nearest_exactly(row, col, close);
             squared[p] = squared_distance(number, row, col);
-            salience[p] = contenders_[at(number)].salience;
+            salience[p] = contenders_[at(number)].level / salience_unit<T>;
             label[p] = contenders_[at(number)].label;
         }
         float distance[tile_pixels];
-        for (int p = 0; p < tile_pixels; ++p)
-            distance[p] = static_cast<float>(grid_.width * (std::sqrt(squared[p]) / salience[p]));
+        weigh(squared, salience, grid_.width, distance);
         const int cols = std::min(tile_size, grid_.cols - tile.x);
         for (int r = 0; r < std::min(tile_size, grid_.rows - tile.y); ++r) {
             std::copy_n(distance + r * tile_size, cols, distance_ + grid_.index(tile.y + r, tile.x));
@@ -141,10 +141,12 @@ private:
         exceed(sources_, find_pivot(sources_, tile, aspect_, upper_.data()), tile, aspect_, upper_.data(),
                lower_.data());
         keep_up_to(0.0f);
+        const std::size_t filled = (kept_.size() + lanes - 1) / lanes * lanes;
         contenders_.resize(kept_.size());
-        weight_.resize(kept_.size());
-        x_.resize(kept_.size());
-        y_.resize(kept_.size());
+        weight_.assign(filled, huge_weight);
+        x_.assign(filled, far_away);
+        y_.assign(filled, far_away);
+        marks_.resize(filled);
         for (std::size_t k = 0; k < kept_.size(); ++k) {
             const std::size_t i = at(kept_[k]), slot = at(sources_.slot(kept_[k]));
             weight_[k] = sources_.weight[i];
@@ -173,14 +175,12 @@ private:
     // The nearest of the contenders whose w d^2 is at most about `close`, of the lowest label among equals.
     int nearest_exactly(double row, double col, float close) {
         const float limit = close * (1.0f + slack);
-        const int count = static_cast<int>(contenders_.size());
-        lower_.resize(contenders_.size());
-        measure(count, weight_.data(), x_.data(), y_.data(), static_cast<float>(row), static_cast<float>(col), aspect_,
-                lower_.data());
+        mark_near(static_cast<int>(weight_.size()), weight_.data(), x_.data(), y_.data(), static_cast<float>(row),
+                  static_cast<float>(col), aspect_, limit, marks_.data());
         int best = -1;
         double best_squared = 0.0;
-        for (int i = 0; i < count; ++i) {
-            if (lower_[at(i)] > limit) continue;
+        for (int i = 0; i < static_cast<int>(contenders_.size()); ++i) {
+            if (!marks_[at(i)]) continue;
             const double squared = squared_distance(i, row, col);
             const auto nearer = [&](const Source& source, const Source& than) {
                 const int sign = compare_exactly(squared, source.level, best_squared, than.level);
@@ -201,7 +201,8 @@ private:
     std::vector<Candidates> blocks_;  // by level
     Candidates sources_;
     std::vector<float> lower_, upper_;
-    std::vector<float> weight_, x_, y_;  // of the contenders for a tile
+    std::vector<float> weight_, x_, y_;  // of the contenders for a tile, and some that are far away
+    std::vector<std::uint8_t> marks_;
     std::vector<Source> contenders_;
     std::vector<int> kept_;
 };

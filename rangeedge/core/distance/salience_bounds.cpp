@@ -149,12 +149,18 @@ RANGEEDGE_WIDE void compare(int count, const float* weight, const float* x, cons
     }
 }
 
-RANGEEDGE_WIDE void measure(int count, const float* weight, const float* x, const float* y, float row, float col,
-                            float aspect, float* value) {
-    for (int i = 0; i < count; ++i) {
-        const float dx = col - x[i], dy = row - y[i];
-        value[i] = weight[i] * (dx * dx + aspect * (dy * dy));
-    }
+RANGEEDGE_WIDE void mark_near(int count, const float* weight, const float* x, const float* y, float row, float col,
+                              float aspect, float limit, std::uint8_t* marks) {
+    for (int first = 0; first < count; first += lanes)
+        for (int i = first; i < first + lanes; ++i) {
+            const float dx = col - x[i], dy = row - y[i];
+            marks[i] = weight[i] * (dx * dx + aspect * (dy * dy)) <= limit;
+        }
+}
+
+RANGEEDGE_WIDE void weigh(const double* squared, const double* salience, double width, float* distance) {
+    for (int p = 0; p < tile_pixels; ++p)
+        distance[p] = static_cast<float>(width * (std::sqrt(squared[p]) / salience[p]));
 }
 
 }  // namespace rangeedge

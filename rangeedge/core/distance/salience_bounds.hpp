@@ -83,8 +83,12 @@ void exceed_as_planes(const Candidates& blocks, const PivotPlane& pivot, const T
 void compare(int count, const float* weight, const float* x, const float* y, const Tile& tile, float aspect,
              float* least, std::int32_t* number, float* second);
 
-// w d^2 of every source at one pixel.
-void measure(int count, const float* weight, const float* x, const float* y, float row, float col, float aspect,
-             float* value);
+// Marks the sources whose w d^2 at one pixel is at most `limit`. Their number is a multiple of `lanes`.
+constexpr int lanes = 16;
+void mark_near(int count, const float* weight, const float* x, const float* y, float row, float col, float aspect,
+               float limit, std::uint8_t* marks);
+
+// width |p - q| / s(q) of every pixel of a tile, from |p - q|^2.
+void weigh(const double* squared, const double* salience, double width, float* distance);
 
 }  // namespace rangeedge

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "base/parallel.hpp"
@@ -23,7 +24,7 @@ void append(std::vector<T>& to, const std::vector<T>& more) {
 }
 
 struct Source {
-    double level, salience;  // as in the map, and in (0, 1]
+    float level;  // as in the map
     std::int32_t label;
 };
 
@@ -163,7 +164,7 @@ public:
             Moments moments;
             branch.root = grow(branch, top, i / across * size, i % across * size - beyond_, moments);
         });
-        for (const Branch& branch : branches) {
+        for (Branch& branch : branches) {
             const auto parts_before = [&](std::size_t level) {
                 return level > 0 ? levels[level - 1].groups() : sources.groups();
             };
@@ -173,6 +174,7 @@ public:
             for (std::size_t level = levels.size() - 1; level-- > 0;)
                 levels[level].append(branch.levels[level], parts_before(level));
             sources.append(branch.sources);
+            branch = {};
         }
         while (levels.back().weight.size() % group_size) levels.back().push({});
     }
@@ -217,12 +219,18 @@ private:
         return whole;
     }
 
+    static bool is_blank(const T* values, int n) {
+        static constexpr T none[tile_size] = {};
+        return std::memcmp(values, none, sizeof(T) * static_cast<std::size_t>(n)) == 0;
+    }
+
     Block smallest_block(Sources& found, int y0, int x0, Moments& moments) const {
         const int y1 = std::min(y0 + tile_size, grid_.rows), x1 = std::min(x0 + tile_size, grid_.cols + beyond_);
         const int begin = found.groups();
         const std::size_t first = found.weight.size();
         Block whole;
-        for (int y = y0; y < y1; ++y)
+        for (int y = y0; y < y1; ++y) {
+            if (x0 >= 0 && x1 <= grid_.cols && is_blank(salience_ + grid_.index(y, x0), x1 - x0)) continue;
             for (int position = x0; position < x1; ++position) {
                 const int x = position < 0 ? position + grid_.cols : position % grid_.cols;
                 const std::size_t p = grid_.index(y, x);
@@ -231,16 +239,17 @@ private:
                 const double s = level / salience_unit<T>;
                 const auto w = static_cast<float>(1.0 / (s * s)), col = static_cast<float>(position),
                            line = static_cast<float>(y);
-                found.push(w, col, line, {level, s, static_cast<std::int32_t>(p)});
+                found.push(w, col, line, {static_cast<float>(salience_[p]), static_cast<std::int32_t>(p)});
                 Block source{w, col, line, col, col, line, line};
                 source.end = 1;  // not empty
                 whole.add(source);
                 moments.add(position, y, s);
             }
+        }
         if (moments.n == 0) return {};
         whole.fit_slopes(moments);
         for (std::size_t i = first; i < found.weight.size(); ++i)
-            whole.raise_to(found.exact[i].salience - whole.rise(found.x[i], found.y[i]));
+            whole.raise_to(found.exact[i].level / salience_unit<T> - whole.rise(found.x[i], found.y[i]));
         found.fill_group();
         whole.begin = begin;
         whole.end = found.groups();

@@ -16,14 +16,14 @@ namespace rangeedge {
 
 class Window {
 public:
-    static constexpr int reach = 120;  // of distances in pixels; with squares up to (reach + 8)^2 sums fit 16 bits
+    static constexpr int reach = 172;  // of distances in pixels; sums of two squares of up to reach + 8 fit 16 bits
 
     // A row of distances, from the row of the nearest source in every column, -1 for none. Returns whether all of them
     // are within reach; else what is written counts for nothing.
     bool distances(const std::int32_t* sources, int y, const Grid& grid, float* distance);
 
 private:
-    Array<std::int16_t> heights_, squared_;
+    Array<std::uint16_t> heights_, squared_;
 };
 
 }  // namespace rangeedge

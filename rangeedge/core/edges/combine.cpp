@@ -2,43 +2,84 @@
 #include "edges/combine.hpp"
 
 #include <algorithm>
+#include <limits>
 
 #include "base/watch.hpp"
 
 namespace rangeedge {
+namespace {
 
-void combine(const std::vector<Candidate>& candidates, float* jump, float* crease, std::uint8_t* kind,
-             float* significance) {
+// The pixels [first, last) of the maps.
+struct Band {
+    std::int32_t first, last;
+
+    // Those beside the cut; returns whether there is one.
+    template <class Visit>
+    bool for_each_pixel(const Candidate& c, Visit&& visit) const {
+        bool here = false;
+        for (const std::int32_t p : {c.before, c.after})
+            if (p >= first && p < last) visit(p), here = true;
+        return here;
+    }
+};
+
+void combine(const std::vector<Candidate>& candidates, const Band& band, const EdgeMaps& maps) {
+    const auto [jump, crease, kind, significance] = maps;
     constexpr int jumps = jump_bit | occluding_bit | occluded_bit, creases = convex_bit | concave_bit;
-    Checkpoints checkpoints;
+    Checkpoints checkpoints(64);  // each of which may be the first to touch its piece of memory
+    std::vector<const Candidate*> others;
     // The largest jump of a pixel (paper, 4.2), and the side of it on which the pixel is.
     for (const Candidate& c : candidates) {
         checkpoints.pass();
-        for (const std::int32_t p : {c.before, c.after}) {
+        const bool jumps_here = c.kind & jump_bit;
+        const bool here = band.for_each_pixel(c, [&, jump = jump, kind = kind, significance = significance](int p) {
             jump[p] = std::max(jump[p], c.jump);
-            if (!(c.kind & jump_bit)) continue;
+            if (!jumps_here) return;
             const bool nearer = ((c.kind & occluding_bit) != 0) == (p == c.before);
             kind[p] = static_cast<std::uint8_t>(kind[p] | jump_bit | (nearer ? occluding_bit : occluded_bit));
             significance[p] = std::max(significance[p], c.significance);
-        }
+        });
+        if (here && !jumps_here) others.push_back(&c);
     }
     // A pixel with a more significant crease is no jump.
-    for (const Candidate& c : candidates) {
+    for (const Candidate* c : others) {
         checkpoints.pass();
-        for (const std::int32_t p : {c.before, c.after})
-            if (c.crease > 0 && c.significance > significance[p]) kind[p] = static_cast<std::uint8_t>(kind[p] & ~jumps);
+        if (!(c->crease > 0)) continue;
+        band.for_each_pixel(*c, [&, kind = kind, significance = significance](int p) {
+            if (c->significance > significance[p]) kind[p] = static_cast<std::uint8_t>(kind[p] & ~jumps);
+        });
     }
     // The largest crease of the others (paper, 4.2), and its type.
-    for (const Candidate& c : candidates) {
+    for (const Candidate* c : others) {
         checkpoints.pass();
-        for (const std::int32_t p : {c.before, c.after}) {
-            if (kind[p] & jump_bit) continue;
-            significance[p] = std::max(significance[p], c.significance);
-            if (c.crease > crease[p] || (c.crease > 0 && c.crease == crease[p] && (c.kind & convex_bit)))
-                kind[p] = static_cast<std::uint8_t>((kind[p] & ~creases) | (c.kind & creases));
-            crease[p] = std::max(crease[p], c.crease);
-        }
+        band.for_each_pixel(*c, [&, crease = crease, kind = kind, significance = significance](int p) {
+            if (kind[p] & jump_bit) return;
+            significance[p] = std::max(significance[p], c->significance);
+            if (c->crease > crease[p] || (c->crease > 0 && c->crease == crease[p] && (c->kind & convex_bit)))
+                kind[p] = static_cast<std::uint8_t>((kind[p] & ~creases) | (c->kind & creases));
+            crease[p] = std::max(crease[p], c->crease);
+        });
     }
+}
+
+}  // namespace
+
+void combine(const std::vector<Candidate>& candidates, const EdgeMaps& maps, Team& team) {
+    if (candidates.empty()) return;
+    // Candidates lie row by row of the image, nearly: where their number is divided evenly, pixels are.
+    const auto border = [&](int i) {
+        if (i == 0) return std::int32_t{0};
+        if (i == team.size()) return std::numeric_limits<std::int32_t>::max();
+        return candidates[candidates.size() * static_cast<std::size_t>(i) / static_cast<std::size_t>(team.size())]
+            .before;
+    };
+    std::vector<std::int32_t> borders;
+    for (int i = 0; i <= team.size(); ++i) borders.push_back(border(i));
+    std::sort(borders.begin(), borders.end());
+    team.run([&](int thread) {
+        const auto i = static_cast<std::size_t>(thread);
+        combine(candidates, Band{borders[i], borders[i + 1]}, maps);
+    });
 }
 
 }  // namespace rangeedge

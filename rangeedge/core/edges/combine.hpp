@@ -8,12 +8,20 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/parallel.hpp"
 #include "edges/candidate.hpp"
 
 namespace rangeedge {
 
-// The maps hold zeros before. Of equal creases, convex.
-void combine(const std::vector<Candidate>& candidates, float* jump, float* crease, std::uint8_t* kind,
-             float* significance);
+// A value for each pixel of the image.
+struct EdgeMaps {
+    float *jump, *crease;
+    std::uint8_t* kind;
+    float* significance;
+};
+
+// The maps hold zeros before. Of equal creases, convex. The order of candidates decides nothing but how evenly threads
+// share them: they should lie row by row.
+void combine(const std::vector<Candidate>& candidates, const EdgeMaps& maps, Team& team);
 
 }  // namespace rangeedge

@@ -249,7 +249,7 @@ std::vector<Part> parts_of(int directions, int rows, int cols) {
 }
 
 // Leaves no candidates on smeared pixels. Every direction has a chance to find these.
-void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, std::uint8_t* smeared) {
+void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, Team& team, std::uint8_t* smeared) {
     std::vector<std::int32_t> pixels;
     Checkpoints checkpoints(64);
     for (const Part& part : parts) {
@@ -259,21 +259,33 @@ void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, s
     int count = 0;
     for (const int direction : all_directions) count += (directions & direction) != 0;
     const SmearMask mask(rows, cols, pixels, count);
-    for (Part& part : parts) {
-        checkpoints.pass();
-        mask.clear_of_candidates(part.found.candidates);
-    }
+    parallel_each(static_cast<int>(parts.size()), team,
+                  [&](int i, int) { mask.clear_of_candidates(parts[static_cast<std::size_t>(i)].found.candidates); });
     if (smeared) mask.write(smeared);
+}
+
+// All candidates by their place in the image, numbered by direction, then by line, then along the line.
+std::vector<Candidate> sorted(std::vector<Part>& parts, int rows, int cols, Team& team) {
+    std::vector<const Candidate*> found;
+    for (Part& part : parts)
+        for (Candidate& c : part.found.candidates) {
+            c.order = static_cast<std::int32_t>(found.size());
+            found.push_back(&c);
+        }
+    const auto at = [&](int i) -> const Candidate& { return *found[static_cast<std::size_t>(i)]; };
+    std::vector<Candidate> candidates(found.size());
+    Cells cells(rows, cols);
+    cells.sort(static_cast<int>(found.size()), at, team,
+               [&](std::int32_t i, int k) { candidates[static_cast<std::size_t>(k)] = at(i); });
+    return candidates;
 }
 
 }  // namespace
 
 template <class T>
-std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, int threads,
+std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, Team& team,
                                        std::uint8_t* smeared, std::vector<Candidate>* weak) {
     std::vector<Part> parts = parts_of(options.directions, frame.rows, frame.cols);
-    constexpr int parts_per_thread = 8;  // for fewer another thread is not worth starting
-    Team team(std::min(threads, 1 + static_cast<int>(parts.size()) / parts_per_thread));
     // Any thread may take any part: they are many, and what they cost differs.
     std::atomic<std::size_t> taken{0};
     team.run([&](int) {
@@ -290,17 +302,8 @@ std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOpti
             part.found = found;
         }
     });
-    clear_smear(parts, frame.rows, frame.cols, options.directions, smeared);
-    std::int32_t order = 0;
-    for (Part& part : parts)
-        for (Candidate& c : part.found.candidates) c.order = order++;
-    std::vector<Candidate> candidates(static_cast<std::size_t>(order));
-    Cells cells(frame.rows, frame.cols);
-    for (const Part& part : parts) cells.count(part.found.candidates);
-    for (const Part& part : parts) {
-        Watch::checkpoint();
-        cells.assign(part.found.candidates, [&](const Candidate& c, std::size_t k) { candidates[k] = c; });
-    }
+    clear_smear(parts, frame.rows, frame.cols, options.directions, team, smeared);
+    std::vector<Candidate> candidates = sorted(parts, frame.rows, frame.cols, team);
     parts.clear();
     join_neighbours(candidates, frame, options, team, weak);
     return candidates;
@@ -352,9 +355,9 @@ void put_in_order(std::vector<Candidate>& candidates) {
     });
 }
 
-#define RANGEEDGE_INSTANTIATE(T)                                                                                 \
-    template std::vector<Candidate> find_candidates(const Frame<T>&, const ScanLineOptions&, int, std::uint8_t*, \
-                                                    std::vector<Candidate>*);                                    \
+#define RANGEEDGE_INSTANTIATE(T)                                                                                   \
+    template std::vector<Candidate> find_candidates(const Frame<T>&, const ScanLineOptions&, Team&, std::uint8_t*, \
+                                                    std::vector<Candidate>*);                                      \
     template LineTrace trace_line(const Frame<T>&, const ScanLineOptions&, int, int, int);
 RANGEEDGE_INSTANTIATE(float)
 RANGEEDGE_INSTANTIATE(double)

@@ -11,6 +11,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/parallel.hpp"
 #include "edges/candidate.hpp"
 #include "image/frame.hpp"
 #include "scanline/options.hpp"
@@ -21,7 +22,7 @@ namespace rangeedge {
 // at pixels over which a step is smeared (smear.hpp); it holds zeros before. `weak`, unless null, receives the
 // candidates that were dropped because they and their neighbours are not significant.
 template <class T>
-std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, int threads,
+std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, Team& team,
                                        std::uint8_t* smeared = nullptr, std::vector<Candidate>* weak = nullptr);
 
 // Brings them into their order along directions and lines.

@@ -3,11 +3,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <algorithm>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "base/array.hpp"
 #include "base/parallel.hpp"
 #include "base/simd.hpp"
 #include "edges/candidate.hpp"
@@ -24,29 +24,36 @@ enum Field { x_field, y_field, first_field };
 // What sums over neighbours need of candidates, by cells, in arrays that may be read a few lanes beyond their end.
 class NeighbourGrid {
 public:
-    NeighbourGrid(const std::vector<Candidate>& candidates, int rows, int cols, int fields)
-        : cells_(rows, cols), stride_(candidates.size() + lanes), order_(candidates.size()), kinds_(stride_, 0),
-          fields_(stride_ * static_cast<std::size_t>(fields), 0.0f) {
-        cells_.count(candidates);
-        cells_.assign(candidates, [&](const Candidate& c, std::size_t k) {
-            order_[k] = static_cast<std::int32_t>(&c - candidates.data());
+    NeighbourGrid(int rows, int cols, Team& team) : cells_(rows, cols), team_(team) {}
+
+    // Takes these candidates in place of those before, with room for so many fields.
+    void sort(const std::vector<Candidate>& candidates, int fields) {
+        const auto count = static_cast<std::ptrdiff_t>(candidates.size());
+        stride_ = count + lanes;
+        order_.resize(count);
+        kinds_.resize(stride_);
+        fields_.resize(stride_ * fields);
+        std::fill(kinds_.begin() + count, kinds_.end(), 0);
+        for (int f = 0; f < fields; ++f) std::fill_n(field(f) + count, lanes, 0.0f);
+        const auto at = [&](int i) -> const Candidate& { return candidates[static_cast<std::size_t>(i)]; };
+        cells_.sort(static_cast<int>(count), at, team_, [&](std::int32_t i, std::ptrdiff_t k) {
+            const Candidate& c = at(i);
+            order_[k] = i;
             kinds_[k] = (c.kind & kinds) | c.direction << direction_shift;
             field(x_field)[k] = c.x;
             field(y_field)[k] = c.y;
         });
     }
 
-    float* field(int f) { return fields_.data() + stride_ * static_cast<std::size_t>(f); }
-    const float* field(int f) const { return fields_.data() + stride_ * static_cast<std::size_t>(f); }
+    float* field(int f) { return fields_.data() + stride_ * f; }
+    const float* field(int f) const { return fields_.data() + stride_ * f; }
     const int* kinds_of_all() const { return kinds_.data(); }
-    // Calls visit(index of a candidate, its place in the arrays) for all.
+    // Calls visit(index of a candidate, its place in the arrays) for all, on any thread.
     template <class Visit>
     void for_each(Visit&& visit) const {
-        Checkpoints checkpoints;
-        for (std::size_t k = 0; k < order_.size(); ++k) {
-            checkpoints.pass();
-            visit(static_cast<std::size_t>(order_[k]), k);
-        }
+        parallel_for(order_.count(), team_, [&](int begin, int end, int) {
+            for (int k = begin; k < end; ++k) visit(static_cast<std::size_t>(order_[k]), k);
+        });
     }
 
     // A candidate and the places, in three rows of cells, where its neighbours are.
@@ -59,13 +66,9 @@ public:
 
     // Calls visit(index, near) for all candidates, several rows of cells at a time.
     template <class Visit>
-    void for_each_near(Team& team, Visit&& visit) const {
-        std::atomic<int> taken{0};
-        team.run([&](int) {
-            for (int row; (row = taken++) < cells_.rows();) {
-                Watch::checkpoint();
-                for (int col = 0; col < cells_.cols(); ++col) visit_cell(col, row, visit);
-            }
+    void for_each_near(Visit&& visit) const {
+        parallel_each(cells_.rows(), team_, [&](int row, int) {
+            for (int col = 0; col < cells_.cols(); ++col) visit_cell(col, row, visit);
         });
     }
 
@@ -87,7 +90,7 @@ private:
             near.first[i] = cells_.begin(left, y);
             near.last[i] = cells_.end(right, y);
         }
-        for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
+        for (int k = begin; k < end; ++k) {
             near.x = field(x_field)[k];
             near.y = field(y_field)[k];
             near.kinds = kinds_[k] & kinds;
@@ -96,10 +99,11 @@ private:
     }
 
     Cells cells_;
-    std::size_t stride_;
-    std::vector<std::int32_t> order_;
-    std::vector<int> kinds_;
-    std::vector<float> fields_;
+    Team& team_;
+    std::ptrdiff_t stride_ = 0;
+    Array<std::int32_t> order_;
+    Array<int> kinds_;
+    Array<float> fields_;
 };
 
 // Calls visit(k, weights, dx, dy) for the candidates k, k + 1, ... several at a time: their distances from the one they

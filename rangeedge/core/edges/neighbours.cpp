@@ -46,29 +46,28 @@ void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, 
         checkpoints.pass();
         return weak(c);
     };
-    {
-        NeighbourGrid grid(candidates, frame.rows, frame.cols, evidence_field + 1);
-        grid.for_each([&](std::size_t i, std::size_t k) {
-            const float s = std::min(candidates[i].significance, largest_share);
-            grid.field(evidence_field)[k] = s * s;
-        });
-        grid.for_each_near(team, [&](std::size_t i, const NeighbourGrid::Near& near) {
-            Candidate& c = candidates[i];
-            c.significance = std::max(std::sqrt(evidence(near)), c.significance * lone_share);
-        });
-    }
+    NeighbourGrid grid(frame.rows, frame.cols, team);
+    grid.sort(candidates, evidence_field + 1);
+    grid.for_each([&](std::size_t i, std::ptrdiff_t k) {
+        const float s = std::min(candidates[i].significance, largest_share);
+        grid.field(evidence_field)[k] = s * s;
+    });
+    grid.for_each_near([&](std::size_t i, const NeighbourGrid::Near& near) {
+        Candidate& c = candidates[i];
+        c.significance = std::max(std::sqrt(evidence(near)), c.significance * lone_share);
+    });
     if (weak_ones) std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(*weak_ones), weak);
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), goes), candidates.end());
     for (const double max_spreads : alignments) {
         if (!aligned) break;
-        const NeighbourGrid grid(candidates, frame.rows, frame.cols, first_field);
-        grid.for_each_near(team, [&](std::size_t k, const NeighbourGrid::Near& near) {
-            align(candidates[k], near, frame, options.max_shift, max_spreads);
+        grid.sort(candidates, first_field);
+        grid.for_each_near([&](std::size_t i, const NeighbourGrid::Near& near) {
+            align(candidates[i], near, frame, options.max_shift, max_spreads);
         });
     }
     if (!options.normals) return;
-    const NeighbourGrid tangents = tangent_grid(candidates, frame.rows, frame.cols);
-    tangents.for_each_near(team, [&](std::size_t i, const NeighbourGrid::Near& near) {
+    sort_with_tangents(candidates, grid);
+    grid.for_each_near([&](std::size_t i, const NeighbourGrid::Near& near) {
         Candidate& c = candidates[i];
         const double angle = c.crease > 0 ? normal_angle(near, frame.projective) : -1;
         if (angle >= 0) c.crease = static_cast<float>(angle);

@@ -108,9 +108,9 @@ double normal_angle(const NeighbourGrid::Near& near, bool projective) {
     return angle_between(std::sqrt(x * x + y * y + z * z), dot);
 }
 
-NeighbourGrid tangent_grid(const std::vector<Candidate>& candidates, int rows, int cols) {
-    NeighbourGrid grid(candidates, rows, cols, fields);
-    grid.for_each([&](std::size_t i, std::size_t k) {
+void sort_with_tangents(const std::vector<Candidate>& candidates, NeighbourGrid& grid) {
+    grid.sort(candidates, fields);
+    grid.for_each([&](std::size_t i, std::ptrdiff_t k) {
         const Candidate& c = candidates[i];
         // Zero times infinity would spoil sums in which a candidate has no weight.
         const auto finite = [](float v) { return std::isfinite(v) ? v : 0.0f; };
@@ -127,7 +127,6 @@ NeighbourGrid tangent_grid(const std::vector<Candidate>& candidates, int rows, i
             grid.field(value_before + side)[k] = finite(s.value);
         }
     });
-    return grid;
 }
 
 }  // namespace rangeedge

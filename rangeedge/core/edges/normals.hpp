@@ -14,8 +14,8 @@
 
 namespace rangeedge {
 
-// The grid of candidates with what `normal_angle` asks of them.
-NeighbourGrid tangent_grid(const std::vector<Candidate>& candidates, int rows, int cols);
+// Fills the grid with candidates and what `normal_angle` asks of them.
+void sort_with_tangents(const std::vector<Candidate>& candidates, NeighbourGrid& grid);
 
 // In degrees; negative where the neighbours do not fix it.
 double normal_angle(const NeighbourGrid::Near& near, bool projective);

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "base/disjoint_sets.hpp"
+#include "base/parallel.hpp"
 #include "base/watch.hpp"
 
 namespace rangeedge {
@@ -34,32 +35,22 @@ public:
     // `connectivity` is 4 or 8; `wrap` says that the first column follows the last.
     template <class T>
     Components(const T* image, int rows, int cols, int connectivity = 4, bool wrap = false) : stride_(cols + 2) {
-        const int stride = stride_, reach = connectivity == 8;
         std::vector<Run> found;
-        DisjointSets sets;      // of runs; the first in raster order represents each
-        std::size_t above = 0;  // first run that may touch the next one from the row above
-        for (int row = 0; row < rows; ++row) {
-            Watch::checkpoint();
-            const std::size_t row_begin = found.size();
-            int p = (row + 1) * stride + 1;
-            for (const int end = p + cols; (p = find_value(image, p, end)) < end;) {
-                const int begin = p;
-                const T value = image[begin];
-                while (image[p] == value) ++p;
-                const Run run{begin, p};
-                const std::size_t i = found.size();
-                found.push_back(run);
-                sets.add();
-                while (above < row_begin && found[above].end + stride + reach <= run.begin) ++above;
-                for (std::size_t k = above; k < row_begin && found[k].begin + stride < run.end + reach; ++k) {
-                    if (image[found[k].begin] != value) continue;
-                    join(sets, k, i);
-                }
-            }
-            above = row_begin;
-        }
-        if (wrap) join_around(image, rows, cols, reach, found, sets);
-        sort(found, sets);
+        for (int row = 0; row < rows; ++row) find_runs(image, row, cols, found);
+        join_and_sort(image, rows, cols, connectivity == 8, wrap, found);
+    }
+    // Likewise, 4-connected, on all threads of a team.
+    template <class T>
+    Components(const T* image, int rows, int cols, Team& team) : stride_(cols + 2) {
+        std::vector<std::vector<Run>> of_threads(static_cast<std::size_t>(team.size()));
+        parallel_for(rows, team, [&](int first, int last, int thread) {
+            for (int row = first; row < last; ++row)
+                find_runs(image, row, cols, of_threads[static_cast<std::size_t>(thread)]);
+        });
+        std::vector<Run> found = std::move(of_threads.front());
+        for (std::size_t k = 1; k < of_threads.size(); ++k)
+            found.insert(found.end(), of_threads[k].begin(), of_threads[k].end());
+        join_and_sort(image, rows, cols, 0, false, found);
     }
 
     int count() const { return static_cast<int>(areas_.size()); }
@@ -82,6 +73,35 @@ private:
         while (p + step <= end && (std::memcpy(&word, image + p, sizeof word), !word)) p += step;
         while (p < end && !image[p]) ++p;
         return p;
+    }
+
+    template <class T>
+    void find_runs(const T* image, int row, int cols, std::vector<Run>& found) const {
+        Watch::checkpoint();
+        int p = (row + 1) * stride_ + 1;
+        for (const int end = p + cols; (p = find_value(image, p, end)) < end;) {
+            const int begin = p;
+            const T value = image[begin];
+            while (image[p] == value) ++p;
+            found.push_back({begin, p});
+        }
+    }
+
+    // Runs in raster order become components.
+    template <class T>
+    void join_and_sort(const T* image, int rows, int cols, int reach, bool wrap, const std::vector<Run>& found) {
+        DisjointSets sets(static_cast<int>(found.size()));  // of runs; the first in raster order represents each
+        std::size_t above = 0;                              // first run that may touch the next one from the row above
+        Checkpoints checkpoints;
+        for (std::size_t i = 0; i < found.size(); ++i) {
+            checkpoints.pass();
+            const Run above_run{found[i].begin - stride_ - reach, found[i].end - stride_ + reach};
+            while (found[above].end <= above_run.begin) ++above;
+            for (std::size_t k = above; k < i && found[k].begin < above_run.end; ++k)
+                if (image[found[k].begin] == image[found[i].begin]) join(sets, k, i);
+        }
+        if (wrap) join_around(image, rows, cols, reach, found, sets);
+        sort(found, sets);
     }
 
     static void join(DisjointSets& sets, std::size_t a, std::size_t b) {

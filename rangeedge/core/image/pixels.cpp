@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "base/simd.hpp"
-#include "base/watch.hpp"
 
 namespace rangeedge {
 namespace {
@@ -65,36 +64,37 @@ void invert_depth(const T* depth, std::size_t size, Real factor, const std::uint
 }
 
 template <class T>
-void mark_boundary(const Frame<T>& frame, std::uint8_t bit, std::uint8_t* kind) {
+void mark_boundary(const Frame<T>& frame, std::uint8_t bit, std::uint8_t* kind, Team& team) {
     // Of every pixel in three rows, the last one read and the two before it: whether it is invalid, and whether it or
     // one beside it in its row is. A column on either side stands for what lies beyond the image and counts as valid.
     const int cols = frame.cols;
     const auto width = static_cast<std::size_t>(cols) + 2;
-    std::vector<std::uint8_t> invalid(3 * width, 0), wide(3 * width, 0);
-    const auto row_of = [&](std::vector<std::uint8_t>& flags, int row) {
-        return flags.data() + static_cast<std::size_t>((row + 3) % 3) * width + 1;
-    };
-    for (int row = 0; row <= frame.rows; ++row) {
-        Watch::checkpoint();
-        std::uint8_t *flags = row_of(invalid, row), *wider = row_of(wide, row);
-        const std::int64_t first = static_cast<std::int64_t>(row) * cols;
-        if (row == frame.rows)
-            std::fill_n(flags, cols, std::uint8_t{0});
-        else if (frame.ordinate)
-            flag_invalid(frame.ordinate + first, cols, flags);
-        else
-            for (int col = 0; col < cols; ++col) flags[col] = !frame.valid_at(col, row);
-        widen(flags, cols, wider);
-        if (row > 0)
-            add_bits(row_of(wide, row - 2), row_of(wide, row - 1), wider, row_of(invalid, row - 1), cols, bit,
-                     kind + first - cols);
-    }
+    parallel_for(frame.rows, team, [&](int begin, int end, int) {
+        std::vector<std::uint8_t> invalid(3 * width, 0), wide(3 * width, 0);
+        const auto row_of = [&](std::vector<std::uint8_t>& flags, int row) {
+            return flags.data() + static_cast<std::size_t>((row + 3) % 3) * width + 1;
+        };
+        for (int row = begin - 1; row <= end; ++row) {
+            std::uint8_t *flags = row_of(invalid, row), *wider = row_of(wide, row);
+            const std::int64_t first = static_cast<std::int64_t>(row) * cols;
+            if (row < 0 || row == frame.rows)
+                std::fill_n(flags, cols, std::uint8_t{0});
+            else if (frame.ordinate)
+                flag_invalid(frame.ordinate + first, cols, flags);
+            else
+                for (int col = 0; col < cols; ++col) flags[col] = !frame.valid_at(col, row);
+            widen(flags, cols, wider);
+            if (row > begin)
+                add_bits(row_of(wide, row - 2), row_of(wide, row - 1), wider, row_of(invalid, row - 1), cols, bit,
+                         kind + first - cols);
+        }
+    });
 }
 
 template void invert_depth(const float*, std::size_t, float, const std::uint8_t*, float*);
 template void invert_depth(const double*, std::size_t, double, const std::uint8_t*, double*);
 template void invert_depth(const std::uint16_t*, std::size_t, float, const std::uint8_t*, float*);
-template void mark_boundary(const Frame<float>&, std::uint8_t, std::uint8_t*);
-template void mark_boundary(const Frame<double>&, std::uint8_t, std::uint8_t*);
+template void mark_boundary(const Frame<float>&, std::uint8_t, std::uint8_t*, Team&);
+template void mark_boundary(const Frame<double>&, std::uint8_t, std::uint8_t*, Team&);
 
 }  // namespace rangeedge

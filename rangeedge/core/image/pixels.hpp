@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "base/parallel.hpp"
 #include "image/frame.hpp"
 
 namespace rangeedge {
@@ -16,6 +17,6 @@ void invert_depth(const T* depth, std::size_t size, Real factor, const std::uint
 
 // Adds `bit` where a pixel is valid and one of its eight neighbours in the image is not.
 template <class T>
-void mark_boundary(const Frame<T>& frame, std::uint8_t bit, std::uint8_t* kind);
+void mark_boundary(const Frame<T>& frame, std::uint8_t bit, std::uint8_t* kind, Team& team);
 
 }  // namespace rangeedge

@@ -20,6 +20,15 @@ Deviation of_heights(const SingleNoise& found, double rounding) {
     return {std::max({found.deviation, finest * extent, rounding}), 0, 0, 0};
 }
 
+// Raises a deviation by a constant, so that at both ends of the depths found it is at least `least` of the depth.
+template <class Least>
+void raise_to(Deviation& deviation, const SingleNoise& found, const Least& least) {
+    for (const double z : {1 / found.highest, 1 / found.lowest}) {
+        const double lack = least(z) - deviation.of_length(z);
+        if (lack > 0) deviation.c0 += lack;
+    }
+}
+
 // a + c z^2 by bins of depth; of the distance where nothing tells it.
 Deviation of_depths(const SingleNoise& found, double rounding) {
     std::vector<double> depths, deviations;
@@ -32,11 +41,7 @@ Deviation of_depths(const SingleNoise& found, double rounding) {
     }
     if (depths.empty()) return {rounding, finest, 0, 0};
     Deviation fitted = fitted_deviation(depths, deviations, {0, 2});
-    // Nowhere in the image below either bound.
-    for (const double z : {1 / found.highest, 1 / found.lowest}) {
-        const double least = std::max(rounding, std::min(finest * z, 1e300)), lack = least - fitted.of_length(z);
-        if (lack > 0) fitted.c0 += lack;
-    }
+    raise_to(fitted, found, [&](double z) { return std::max(rounding, std::min(finest * z, 1e300)); });
     return fitted;
 }
 
@@ -54,6 +59,8 @@ NoiseEstimate estimate_noise(const T* ordinate, int rows, int cols, bool project
     const double middle = (found.lowest + found.highest) / 2, extent = found.highest - found.lowest;
     const bool silent = found.quiet <= finest * (projective ? std::abs(middle) : extent);
     estimate.fits = fit_noise(ordinate, rows, cols, projective, estimate.single, silent, team);
+    // Over many samples rounding errs as much as over few where it takes a while from one value to the next.
+    if (projective) raise_to(estimate.fits.waves, found, [&](double) { return rounding; });
     return estimate;
 }
 

@@ -22,9 +22,10 @@ BoundCandidates keep_candidates(const BoundFrame& bound, const ScanLineOptions& 
                                 const OutImage<std::uint8_t>& kind, const OutImage<float>& significance) {
     return std::visit(
         [&](const auto& frame) {
-            BoundCandidates found{find_candidates(frame, options, threads)};
-            combine(found.all, jump.data(), crease.data(), kind.data(), significance.data());
-            mark_boundary(frame, boundary_bit, kind.data());
+            Team team = team_for(bound, threads);
+            BoundCandidates found{find_candidates(frame, options, team)};
+            combine(found.all, {jump.data(), crease.data(), kind.data(), significance.data()}, team);
+            mark_boundary(frame, boundary_bit, kind.data(), team);
             return found;
         },
         bound.frame);

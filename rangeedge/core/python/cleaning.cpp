@@ -19,9 +19,10 @@ void edge_strength_and_flying(const BoundFrame& bound, const ScanLineOptions& op
                               const OutImage<std::uint8_t>& flying) {
     std::visit(
         [&](const auto& frame) {
-            combine(find_candidates(frame, options, threads, flying.data()), jump.data(), crease.data(), kind.data(),
-                    significance.data());
-            mark_boundary(frame, boundary_bit, kind.data());
+            Team team = team_for(bound, threads);
+            combine(find_candidates(frame, options, team, flying.data()),
+                    {jump.data(), crease.data(), kind.data(), significance.data()}, team);
+            mark_boundary(frame, boundary_bit, kind.data(), team);
         },
         bound.frame);
 }

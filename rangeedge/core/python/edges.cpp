@@ -28,15 +28,16 @@ auto split_scan_line(const Values<T>& y, const Values<T>& x, double eps) {
     return handed_over<int>(std::move(segments));
 }
 
-std::vector<Candidate> candidates_of(const BoundFrame& bound, const ScanLineOptions& options, int threads) {
-    return std::visit([&](const auto& frame) { return find_candidates(frame, options, threads); }, bound.frame);
+std::vector<Candidate> candidates_of(const BoundFrame& bound, const ScanLineOptions& options, Team& team) {
+    return std::visit([&](const auto& frame) { return find_candidates(frame, options, team); }, bound.frame);
 }
 
-Columns edge_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads) {
+Columns edge_candidates(const BoundFrame& bound, const ScanLineOptions& options, int threads) {
     std::vector<Candidate> candidates;
     {
         const Unlock unlock;
-        candidates = candidates_of(frame, options, threads);
+        Team team = team_for(bound, threads);
+        candidates = candidates_of(bound, options, team);
         put_in_order(candidates);
     }
     return columns(candidates);
@@ -44,15 +45,18 @@ Columns edge_candidates(const BoundFrame& frame, const ScanLineOptions& options,
 
 using Strengths = OutImage<float>;
 
-void fill(const BoundFrame& bound, const std::vector<Candidate>& candidates, const Strengths& jump,
-          const Strengths& crease, const OutImage<std::uint8_t>& kind, const Strengths& significance) {
-    combine(candidates, jump.data(), crease.data(), kind.data(), significance.data());
-    std::visit([&](const auto& frame) { mark_boundary(frame, boundary_bit, kind.data()); }, bound.frame);
+std::vector<Candidate> fill(const BoundFrame& bound, const ScanLineOptions& options, int threads,
+                            const EdgeMaps& maps) {
+    Team team = team_for(bound, threads);
+    std::vector<Candidate> candidates = candidates_of(bound, options, team);
+    combine(candidates, maps, team);
+    std::visit([&](const auto& frame) { mark_boundary(frame, boundary_bit, maps.kind, team); }, bound.frame);
+    return candidates;
 }
 
 void edge_strength(const BoundFrame& frame, const ScanLineOptions& options, int threads, const Strengths& jump,
                    const Strengths& crease, const OutImage<std::uint8_t>& kind, const Strengths& significance) {
-    fill(frame, candidates_of(frame, options, threads), jump, crease, kind, significance);
+    fill(frame, options, threads, {jump.data(), crease.data(), kind.data(), significance.data()});
 }
 
 Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads,
@@ -61,8 +65,7 @@ Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOpti
     std::vector<Candidate> candidates;
     {
         const Unlock unlock;
-        candidates = candidates_of(frame, options, threads);
-        fill(frame, candidates, jump, crease, kind, significance);
+        candidates = fill(frame, options, threads, {jump.data(), crease.data(), kind.data(), significance.data()});
         put_in_order(candidates);
     }
     return columns(candidates);
@@ -70,7 +73,8 @@ Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOpti
 
 void flying_pixels(const BoundFrame& bound, const ScanLineOptions& options, int threads,
                    const OutImage<std::uint8_t>& flying) {
-    std::visit([&](const auto& frame) { find_candidates(frame, options, threads, flying.data()); }, bound.frame);
+    Team team = team_for(bound, threads);
+    std::visit([&](const auto& frame) { find_candidates(frame, options, team, flying.data()); }, bound.frame);
 }
 
 void bound_keep_lines(const Image<std::uint8_t>& edges, bool wrap, int min_length, const Image<float>& significance,

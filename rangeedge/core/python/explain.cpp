@@ -14,7 +14,8 @@ nb::tuple kept_and_weak(const BoundFrame& bound, const ScanLineOptions& options,
     std::vector<Candidate> kept, weak;
     {
         const Unlock unlock;
-        std::visit([&](const auto& frame) { kept = find_candidates(frame, options, threads, nullptr, &weak); },
+        Team team = team_for(bound, threads);
+        std::visit([&](const auto& frame) { kept = find_candidates(frame, options, team, nullptr, &weak); },
                    bound.frame);
     }
     return nb::make_tuple(columns(kept), columns(weak));
@@ -23,7 +24,10 @@ nb::tuple kept_and_weak(const BoundFrame& bound, const ScanLineOptions& options,
 // Samples, segments and cuts, a row each, in the order of the fields of their structs.
 nb::tuple traced_line(const BoundFrame& bound, const ScanLineOptions& options, int direction, int col, int row) {
     LineTrace trace;
-    std::visit([&](const auto& frame) { trace = trace_line(frame, options, direction, col, row); }, bound.frame);
+    {
+        const Unlock unlock;
+        std::visit([&](const auto& frame) { trace = trace_line(frame, options, direction, col, row); }, bound.frame);
+    }
     return nb::make_tuple(handed_over<double>(std::move(trace.samples)), handed_over<double>(std::move(trace.segments)),
                           handed_over<double>(std::move(trace.cuts)));
 }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <variant>
 
+#include "base/parallel.hpp"
 #include "image/frame.hpp"
 #include "python/arrays.hpp"
 
@@ -59,5 +60,13 @@ struct BoundFrame {
     Image<float> map;
     std::variant<Frame<float>, Frame<double>> frame;
 };
+
+// Threads for kernels that detect edges: no more than are worth starting for an image of that size.
+inline Team team_for(const BoundFrame& bound, int threads) {
+    constexpr std::int64_t pixels_per_thread = 1 << 15;
+    const std::int64_t pixels =
+        std::visit([](const auto& frame) { return std::int64_t{frame.rows} * frame.cols; }, bound.frame);
+    return Team(static_cast<int>(std::min<std::int64_t>(threads, 1 + pixels / pixels_per_thread)));
+}
 
 }  // namespace rangeedge::python

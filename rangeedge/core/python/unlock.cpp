@@ -102,6 +102,7 @@ void bind_cancellation(nb::module_& m) {
             PyErr_SetString(type.ptr(), "the call was given up");
         }
     });
+    m.def("checkpoint", &ask_cancellations, "Gives up a call that is within the block of a set cancellation.");
     nb::set_leak_warnings(false);  // of what threads hold that are still at work then
     nb::module_::import_("atexit").attr("register")(nb::cpp_function(&end_python));
     const nb::module_ os = nb::module_::import_("os");

@@ -15,14 +15,20 @@
 namespace rangeedge {
 namespace {
 
-constexpr double tile_tolerance = 0.8;       // root mean square misfit of a tile, in tolerances of a pixel
-constexpr double shares[]{0.5, 1};           // of the mean square misfit: tiles that fit well come first
-constexpr int rounds_between_tiles = 8;      // of pixels
-constexpr int worth_tiles = 600;             // one pixel in so many that grew meanwhile
-constexpr int most_adjustments = 8;          // rounds at borders
-constexpr std::size_t prefetched = 12;       // pixels ahead
-constexpr std::size_t worth_threads = 1024;  // pixels
-constexpr std::size_t tiles_worth_threads = 64;
+constexpr double tile_tolerance = 0.8;      // root mean square misfit of a tile, in tolerances of a pixel
+constexpr double shares[]{0.5, 1};          // of the mean square misfit: tiles that fit well come first
+constexpr int rounds_between_tiles = 8;     // of pixels
+constexpr int worth_tiles = 600;            // one pixel in so many that grew meanwhile
+constexpr int most_adjustments = 8;         // rounds at borders
+constexpr std::size_t prefetched = 12;      // pixels ahead
+constexpr std::size_t worth_threads = 256;  // pixels
+constexpr std::size_t tiles_worth_threads = 16;
+
+// Each once, in raster order.
+void sort_out(std::vector<int>& tiles) {
+    std::sort(tiles.begin(), tiles.end());
+    tiles.erase(std::unique(tiles.begin(), tiles.end()), tiles.end());
+}
 
 // Visits the pixels around a tile.
 template <class F>
@@ -36,7 +42,9 @@ void for_around(const Tiles& tiles, int t, int stride, F&& visit) {
 
 }  // namespace
 
-Grower::Grower(PatchMap& patches) : patches_(patches), image_(patches.image()), waiting_(image_.size(), 0) {}
+Grower::Grower(PatchMap& patches)
+    : patches_(patches), image_(patches.image()), waiting_(image_.size(), 0), came_(image_.size(), 0),
+      found_(static_cast<std::size_t>(patches.team().size())), offers_(found_.size() * found_.size()) {}
 
 void Grower::grow(double tolerance) {
     start(PatchMap::open_pixel, tolerance);
@@ -54,21 +62,35 @@ void Grower::fill(double tolerance) {
     over_pixels(image_.size(), false);
 }
 
-// The free pixels that touch a patch come to the front.
-void Grower::start(PatchMap::Free reach, double tolerance) {
-    reach_ = reach;
-    limit_ = tolerance * tolerance;
-    std::vector<std::vector<int>> found(static_cast<std::size_t>(patches_.team().size()));
+// The pixels that for_rows(first, last, visit) finds in rows [first, last) become the front.
+template <class F>
+void Grower::start(F&& for_rows) {
     parallel_for(image_.rows(), patches_.team(), [&](int first, int last, int thread) {
-        patches_.for_free(first, last, reach, [&](int p) {
-            bool touches = false;
-            for (const int step : image_.neighbours()) touches = touches || patches_[p + step];
-            if (touches) found[static_cast<std::size_t>(thread)].push_back(p);
+        for_rows(first, last, [&](int p) {
+            waiting_[p] = pixel_waits;
+            found_[static_cast<std::size_t>(thread)].push_back(p);
         });
     });
     front_.clear();
-    for (const auto& of_thread : found)
-        for (const int p : of_thread) wait(p);
+    gather(front_);
+}
+
+// Likewise the free pixels that touch a patch.
+void Grower::start(PatchMap::Free reach, double tolerance) {
+    reach_ = reach;
+    limit_ = tolerance * tolerance;
+    start([&](int first, int last, auto&& visit) { patches_.for_touching(first, last, reach, visit); });
+}
+
+// Appends what the threads have found.
+void Grower::gather(std::vector<int>& to) {
+    for (std::vector<int>& of_thread : found_) {
+        if (to.empty())
+            to.swap(of_thread);
+        else
+            to.insert(to.end(), of_thread.begin(), of_thread.end());
+        of_thread.clear();
+    }
 }
 
 void Grower::wait(int p) {
@@ -114,42 +136,46 @@ void Grower::take_tile(const Tiles& tiles, int t, int i, const SurfaceSums& sums
             patches_.take(p, i);
 }
 
-// Calls body(mine) on all threads if it is `shared`, where mine(i) says whether patch i belongs to the thread.
+// Calls body(thread) for every thread, on all of them if the work is `shared`. Patch i belongs to thread i % threads.
 template <class F>
 void Grower::for_patches(bool shared, F&& body) {
-    const int threads = shared ? patches_.team().size() : 1;
-    const auto of_thread = [&](int thread) { body([=](int i) { return i % threads == thread; }); };
-    if (threads > 1)
-        patches_.team().run(of_thread);
+    const int threads = patches_.team().size();
+    if (shared && threads > 1)
+        patches_.team().run(body);
     else
-        of_thread(0);
+        for (int thread = 0; thread < threads; ++thread) body(thread);
 }
 
 void Grower::over_tiles(const Tiles& tiles) {
-    // Free tiles that touch a patch, in raster order.
-    std::vector<std::vector<int>> found(static_cast<std::size_t>(patches_.team().size()));
-    parallel_for(tiles.count(), patches_.team(), [&](int begin, int end, int thread) {
-        for (int t = begin; t < end; ++t) {
-            if (!is_free(tiles, t)) continue;
-            bool touches = false;
-            for_around(tiles, t, image_.stride(), [&](int q) { touches = touches || patches_[q]; });
-            if (touches) found[static_cast<std::size_t>(thread)].push_back(t);
-        }
+    // Tiles of pixels that touch a patch, in raster order.
+    for_front([&](int p, std::size_t thread) {
+        std::vector<int>& found = found_[thread];
+        const int t = tiles.at(p);
+        if (t >= 0 && (found.empty() || t != found.back())) found.push_back(t);
     });
     tiles_.clear(), taken_.clear();
-    for (const auto& of_thread : found) tiles_.insert(tiles_.end(), of_thread.begin(), of_thread.end());
+    gather(tiles_);
+    sort_out(tiles_);
     const double limit = tile_tolerance * tile_tolerance * limit_;
     for (const double share : shares) over_tiles(tiles, share * limit);
-    for (const int t : taken_)
-        for_around(tiles, t, image_.stride(), [&](int q) {
-            if (patches_.is_free(q, reach_)) wait(q);
-        });
+    // The free pixels around those that were taken come to the front.
+    parallel_for(static_cast<int>(taken_.size()), patches_.team(), [&](int begin, int end, int thread) {
+        for (int k = begin; k < end; ++k)
+            for_around(tiles, taken_[static_cast<std::size_t>(k)], image_.stride(), [&](int q) {
+                if (patches_.is_free(q, reach_) && !waiting_[q]) found_[static_cast<std::size_t>(thread)].push_back(q);
+            });
+    });
+    for (std::vector<int>& of_thread : found_) {
+        for (const int p : of_thread) wait(p);
+        of_thread.clear();
+    }
 }
 
 // Takes tiles whose misfit is below `limit`, and those around them in turn. Others that were looked at are left in
 // tiles_.
 void Grower::over_tiles(const Tiles& tiles, double limit) {
     rejected_.clear();
+    const int threads = patches_.team().size();
     while (!tiles_.empty()) {
         const int count = static_cast<int>(tiles_.size());
         const bool shared = tiles_.size() >= tiles_worth_threads;
@@ -168,9 +194,9 @@ void Grower::over_tiles(const Tiles& tiles, double limit) {
             parallel_for(count, patches_.team(), choose_all);
         else
             choose_all(0, count, 0);
-        for_patches(shared, [&](auto&& mine) {
+        for_patches(shared, [&](int thread) {
             for (std::size_t k = 0; k < tiles_.size(); ++k)
-                if (choices_[k].patch && choices_[k].residual < limit && mine(choices_[k].patch))
+                if (choices_[k].patch && choices_[k].residual < limit && choices_[k].patch % threads == thread)
                     take_tile(tiles, tiles_[k], choices_[k].patch, sums_[k]);
         });
         const std::size_t before = taken_.size();
@@ -192,13 +218,12 @@ void Grower::over_tiles(const Tiles& tiles, double limit) {
             }
         }
     }
-    // Each once, in raster order.
-    std::sort(rejected_.begin(), rejected_.end());
-    rejected_.erase(std::unique(rejected_.begin(), rejected_.end()), rejected_.end());
+    sort_out(rejected_);
     tiles_.swap(rejected_);
 }
 
-Grower::Choice Grower::choose(int p) const {
+// Which of the neighbouring patches a free pixel fits best.
+int Grower::choose(int p) const {
     Choice best{0, limit_};
     int last = 0;
     for (const int step : image_.neighbours()) {
@@ -208,18 +233,18 @@ Grower::Choice Grower::choose(int p) const {
         const double r = image_.residual(p, patches_.patch(i).surface);
         if (r < best.residual) best = {i, r};
     }
-    return best;
+    return best.patch;
 }
 
-// Calls visit(k) for all k of front_, in parallel if they are many.
+// Calls visit(p, thread) for all pixels p of the front, in parallel if they are many; every thread has a stretch of its own.
 template <class F>
 void Grower::for_front(F&& visit) {
-    const auto visit_all = [&](int begin, int end, int) {
+    const auto visit_all = [&](int begin, int end, int thread) {
         Checkpoints checkpoints;
         for (auto k = static_cast<std::size_t>(begin); k < static_cast<std::size_t>(end); ++k) {
             checkpoints.pass();
             patches_.prefetch(front_[std::min(k + prefetched, front_.size() - 1)]);
-            visit(k);
+            visit(front_[k], static_cast<std::size_t>(thread));
         }
     };
     const int size = static_cast<int>(front_.size());
@@ -229,89 +254,91 @@ void Grower::for_front(F&& visit) {
         visit_all(0, size, 0);
 }
 
-// Choices become true. Every patch belongs to one thread, which adds its pixels in order.
+// Offers become true. Every patch belongs to one thread, which adds its pixels in the order of the front.
 void Grower::commit(bool refit) {
-    for_patches(front_.size() >= worth_threads, [&](auto&& mine) {
+    const auto threads = static_cast<std::size_t>(patches_.team().size());
+    for_patches(front_.size() >= worth_threads, [&](int owner) {
         Checkpoints checkpoints;
-        for (std::size_t k = 0; k < front_.size(); ++k) {
-            checkpoints.pass();
-            const int p = front_[k], i = choices_[k].patch;
-            patches_.prefetch(front_[std::min(k + prefetched, front_.size() - 1)]);
-            if (!mine(i)) continue;
-            waiting_[p] = 0;
-            if (!i) continue;
-            patches_.take(p, i);
-            if (!refit) continue;
-            Patch& patch = patches_.patch(i);
-            patch.sums.add(image_.sample(p));
-            refit_when_due(patch);
+        for (std::size_t thread = 0; thread < threads; ++thread) {
+            std::vector<Offer>& offers = offers_[thread * threads + static_cast<std::size_t>(owner)];
+            for (const auto& [p, i] : offers) {
+                checkpoints.pass();
+                patches_.take(p, i);
+                came_[p] = round_;
+                if (!refit) continue;
+                Patch& patch = patches_.patch(i);
+                patch.sums.add(image_.sample(p));
+                refit_when_due(patch);
+            }
+            offers.clear();
         }
     });
+}
+
+// One round: the pixels of the front go where they choose, all at once, and the pixels q beside one that went, p, for
+// which concerns(p, q) holds, become the front. Returns how many went.
+template <class Choose, class Concerns>
+int Grower::over_front(Choose&& choose, Concerns&& concerns, bool refit) {
+    if (++round_ == 0) {
+        std::fill(came_.begin(), came_.end(), std::uint8_t{0});
+        round_ = 1;
+    }
+    const auto threads = static_cast<std::size_t>(patches_.team().size());
+    for_front([&](int p, std::size_t thread) {
+        waiting_[p] = 0;
+        const int i = choose(p);
+        if (i) offers_[thread * threads + static_cast<std::size_t>(i) % threads].push_back({p, i});
+    });
+    std::size_t count = 0;
+    for (const std::vector<Offer>& offers : offers_) count += offers.size();
+    commit(refit);
+    const std::array<int, 4> around = image_.neighbours();
+    for_front([&](int p, std::size_t thread) {
+        if (came_[p] != round_) return;
+        for (std::size_t k = 0; k < around.size(); ++k) {
+            const int q = p + around[k];
+            if (!concerns(p, q)) continue;
+            // Of all that came beside it, the first counts.
+            bool found = false;
+            for (std::size_t other = 0; other < k; ++other) {
+                const int beside = q - around[other];
+                found = found || (came_[beside] == round_ && concerns(beside, q));
+            }
+            if (found) continue;
+            waiting_[q] = pixel_waits;
+            found_[thread].push_back(q);
+        }
+    });
+    front_.clear();
+    gather(front_);
+    return static_cast<int>(count);
 }
 
 // Returns how many pixels were taken.
 int Grower::over_pixels(int rounds, bool refit) {
     int count = 0;
-    for (int round = 0; round < rounds && !front_.empty(); ++round) {
-        choices_.resize(front_.size());
-        for_front(
-            [&](std::size_t k) { choices_[k] = patches_.is_free(front_[k], reach_) ? choose(front_[k]) : Choice{}; });
-        commit(refit);
-        next_.swap(front_);
-        front_.clear();
-        Checkpoints checkpoints;
-        for (std::size_t k = 0; k < next_.size(); ++k) {
-            checkpoints.pass();
-            if (choices_[k].patch) {
-                ++count;
-                for (const int step : image_.neighbours())
-                    if (patches_.is_free(next_[k] + step, reach_)) wait(next_[k] + step);
-            }
-        }
-    }
+    for (int round = 0; round < rounds && !front_.empty(); ++round)
+        count += over_front([&](int p) { return patches_.is_free(p, reach_) ? choose(p) : 0; },
+                            [&](int, int q) { return patches_.is_free(q, reach_); }, refit);
     return count;
 }
 
 void Grower::adjust_borders() {
-    front_.clear();
-    std::vector<std::vector<int>> found(static_cast<std::size_t>(patches_.team().size()));
-    parallel_for(image_.rows(), patches_.team(), [&](int first, int last, int thread) {
-        patches_.for_borders(first, last, [&](int p) {
-            for (const int q : {p + 1, p + image_.stride()})
-                if (patches_[p] && patches_[q] && patches_[p] != patches_[q])
-                    for (const int of_pair : {p, q}) found[static_cast<std::size_t>(thread)].push_back(of_pair);
-        });
-    });
-    for (const auto& of_thread : found)
-        for (const int p : of_thread) wait(p);
-    for (int round = 0; round < most_adjustments && !front_.empty(); ++round) {
-        choices_.resize(front_.size());
-        for_front([&](std::size_t k) {
-            const int p = front_[k], own = patches_[p];
-            Choice best{own, -1};
-            for (const int step : image_.neighbours()) {
-                const int other = patches_[p + step];
-                if (!own || !other || other == best.patch || other == own) continue;
-                if (best.residual < 0) best.residual = image_.residual(p, patches_.patch(own).surface);
-                const double r = image_.residual(p, patches_.patch(other).surface);
-                if (r < best.residual) best = {other, r};
-            }
-            choices_[k] = best;
-        });
-        next_.swap(front_);
-        front_.clear();
-        for (const int p : next_) waiting_[p] = 0;
-        Checkpoints checkpoints;
-        for (std::size_t k = 0; k < next_.size(); ++k) {
-            checkpoints.pass();
-            const int p = next_[k];
-            if (choices_[k].patch == patches_[p]) continue;
-            patches_.take(p, choices_[k].patch);
-            wait(p);
-            for (const int step : image_.neighbours())
-                if (patches_[p + step]) wait(p + step);
+    start([&](int first, int last, auto&& visit) { patches_.for_rims(first, last, visit); });
+    const auto choose_other = [&](int p) {
+        const int own = patches_[p];
+        Choice best{0, -1};
+        for (const int step : image_.neighbours()) {
+            const int other = patches_[p + step];
+            if (!other || other == best.patch || other == own) continue;
+            if (best.residual < 0) best.residual = image_.residual(p, patches_.patch(own).surface);
+            const double r = image_.residual(p, patches_.patch(other).surface);
+            if (r < best.residual) best = {other, r};
         }
-    }
+        return best.patch;
+    };
+    for (int round = 0; round < most_adjustments && !front_.empty(); ++round)
+        over_front(choose_other, [&](int p, int q) { return patches_[q] && patches_[q] != patches_[p]; }, false);
     for (const int p : front_) waiting_[p] = 0;
     front_.clear();
 }

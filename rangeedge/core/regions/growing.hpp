@@ -30,7 +30,15 @@ private:
         double residual = 0;
     };
 
+    // A pixel that goes to a patch.
+    struct Offer {
+        int pixel, patch;
+    };
+
+    template <class F>
+    void start(F&& for_rows);
     void start(PatchMap::Free reach, double tolerance);
+    void gather(std::vector<int>& to);
     void over_tiles(const Tiles& tiles);
     void over_tiles(const Tiles& tiles, double limit);
     int over_pixels(int rounds, bool refit);
@@ -40,8 +48,10 @@ private:
     void refit_when_due(Patch& patch);
     template <class F>
     void for_patches(bool shared, F&& body);
-    Choice choose(int p) const;
+    int choose(int p) const;
     void commit(bool refit);
+    template <class Choose, class Concerns>
+    int over_front(Choose&& choose, Concerns&& concerns, bool refit);
     void wait(int p);
     template <class F>
     void for_front(F&& body);
@@ -53,10 +63,14 @@ private:
     // Whether a pixel is in front_, or the tile that begins with it in tiles_.
     static constexpr std::uint8_t pixel_waits = 1, tile_waits = 2;
     Array<std::uint8_t> waiting_;
-    std::vector<int> front_, next_;
+    std::uint8_t round_ = 0;
+    Array<std::uint8_t> came_;  // round in which a pixel went to its patch
+    std::vector<int> front_;
+    std::vector<std::vector<int>> found_;     // of every thread: the next front
+    std::vector<std::vector<Offer>> offers_;  // of every thread, to the patches of every thread
     std::vector<int> tiles_, rejected_, taken_;
     std::vector<SurfaceSums> sums_;  // of tiles_
-    std::vector<Choice> choices_;
+    std::vector<Choice> choices_;    // of tiles_
 };
 
 }  // namespace rangeedge

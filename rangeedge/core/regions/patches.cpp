@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <utility>
 
+#include "base/simd.hpp"
 #include "regions/roof.hpp"
 
 namespace rangeedge {
@@ -14,17 +16,58 @@ namespace {
 constexpr int max_cuts = 4;    // of one set of pixels into planes
 constexpr double grown = 1.1;  // a patch that may have become a roof, in pixels it had when it was none
 
+// A row of n pixels each; rows are `stride` apart.
+RANGEEDGE_WIDE void mark_changes(const int* __restrict label, int stride, int n, std::uint8_t* __restrict marks) {
+    const int* const below = label + stride;
+    for (int k = 0; k < n; ++k) marks[k] = ((label[k] ^ label[k + 1]) | (label[k] ^ below[k])) != 0;
+}
+
+RANGEEDGE_WIDE void mark_contacts(const int* __restrict label, int stride, int n, std::uint8_t* __restrict marks) {
+    const int *const above = label - stride, *const below = label + stride;
+    for (int k = 0; k < n; ++k) {
+        const int own = label[k], a = above[k], b = below[k], c = label[k - 1], d = label[k + 1];
+        const int differ =
+            ((a != 0) & (a != own)) | ((b != 0) & (b != own)) | ((c != 0) & (c != own)) | ((d != 0) & (d != own));
+        marks[k] = static_cast<std::uint8_t>(differ & (own != 0));
+    }
+}
+
+RANGEEDGE_WIDE void mark_up_to(const std::uint8_t* __restrict state, int n, std::uint8_t reach,
+                               std::uint8_t* __restrict marks) {
+    for (int k = 0; k < n; ++k) marks[k] = static_cast<std::uint8_t>((state[k] != 0) & (state[k] <= reach));
+}
+
+RANGEEDGE_WIDE void keep_beside(const int* __restrict label, int stride, int n, std::uint8_t* __restrict marks) {
+    const int *const above = label - stride, *const below = label + stride;
+    for (int k = 0; k < n; ++k)
+        marks[k] = static_cast<std::uint8_t>(marks[k] & ((above[k] | below[k] | label[k - 1] | label[k + 1]) != 0));
+}
+
 }  // namespace
 
 PatchMap::PatchMap(const RangeMap& map, Team& team)
     : image_(map, lateral_deviation, team), tiles_(image_, team), team_(team), label_(image_.size(), 0),
-      free_(label_.size(), taken) {
-    parallel_for(image_.rows(), team_, [&](int first, int last, int) {
-        for (int p = image_.index(first, 0), end = image_.index(last, 0); p < end; ++p) release(p);
-    });
+      free_(image_.states()) {
     create({});
     const TileNoise noise = tile_noise(tiles_);
     image_.set_correlation(std::min(noise.deviation, correlation_max), noise.area);
+}
+
+void PatchMap::mark_borders(int p, std::uint8_t* marks) const {
+    mark_changes(&label_[p], image_.stride(), image_.cols(), marks);
+}
+
+void PatchMap::mark_rims(int p, std::uint8_t* marks) const {
+    mark_contacts(&label_[p], image_.stride(), image_.cols(), marks);
+}
+
+void PatchMap::mark_free(int p, Free reach, std::uint8_t* marks) const {
+    mark_up_to(&free_[p], image_.cols(), reach, marks);
+}
+
+void PatchMap::mark_touching(int p, Free reach, std::uint8_t* marks) const {
+    mark_free(p, reach, marks);
+    keep_beside(&label_[p], image_.stride(), image_.cols(), marks);
 }
 
 void PatchMap::create(const Piece& piece) {
@@ -50,8 +93,10 @@ void PatchMap::flatten() {
 }
 
 void PatchMap::refit() {
-    for (Patch& p : patches_)
-        if (p.count()) p.surface = image_.surface_of(p.sums);
+    parallel_for(count(), team_, [&](int begin, int end, int) {
+        for (int i = begin; i < end; ++i)
+            if (patch(i).count()) patch(i).surface = image_.surface_of(patch(i).sums);
+    });
 }
 
 std::vector<SurfaceSums> PatchMap::sums_of(const std::vector<Pixels>& sets) const {
@@ -69,24 +114,36 @@ void PatchMap::add_markers(const std::int32_t* markers) {
         std::int32_t marker;
         int begin, end;
     };
+    std::vector<std::vector<Run>> found(static_cast<std::size_t>(team_.size()));
+    parallel_for(image_.rows(), team_, [&](int first, int last, int thread) {
+        for (int row = first; row < last; ++row)
+            for (int col = 0; col < image_.cols();) {
+                const std::int32_t* const m = markers + std::ptrdiff_t{row} * image_.cols();
+                const std::int32_t marker = m[col];
+                const int begin = col;
+                while (col < image_.cols() && m[col] == marker) ++col;
+                if (marker <= 0) continue;
+                found[static_cast<std::size_t>(thread)].push_back(
+                    {marker, image_.index(row, begin), image_.index(row, col)});
+            }
+    });
     std::vector<Run> runs;
-    for (int row = 0; row < image_.rows(); ++row)
-        for (int col = 0; col < image_.cols();) {
-            const std::int32_t* const m = markers + row * image_.cols();
-            const std::int32_t marker = m[col];
-            const int begin = col;
-            while (col < image_.cols() && m[col] == marker) ++col;
-            if (marker > 0) runs.push_back({marker, image_.index(row, begin), image_.index(row, col)});
-        }
+    for (const auto& of_thread : found) runs.insert(runs.end(), of_thread.begin(), of_thread.end());
     std::stable_sort(runs.begin(), runs.end(), [](const Run& a, const Run& b) { return a.marker < b.marker; });
-    std::vector<Pixels> sets;
-    Checkpoints checkpoints;
-    for (std::size_t k = 0; k < runs.size(); ++k) {
-        checkpoints.pass();
-        if (k == 0 || runs[k].marker != runs[k - 1].marker) sets.emplace_back();
-        for (int p = runs[k].begin; p < runs[k].end; ++p)
-            if (image_.open(p)) sets.back().push_back(p);
-    }
+    std::vector<std::size_t> start;  // of every marker
+    for (std::size_t k = 0; k < runs.size(); ++k)
+        if (k == 0 || runs[k].marker != runs[k - 1].marker) start.push_back(k);
+    std::vector<Pixels> sets(start.size());
+    start.push_back(runs.size());
+    parallel_each(static_cast<int>(sets.size()), team_, [&](int i, int) {
+        const auto n = static_cast<std::size_t>(i);
+        Checkpoints checkpoints;
+        for (std::size_t k = start[n]; k < start[n + 1]; ++k) {
+            checkpoints.pass();
+            for (int p = runs[k].begin; p < runs[k].end; ++p)
+                if (image_.open(p)) sets[n].push_back(p);
+        }
+    });
     const std::vector<SurfaceSums> sums = sums_of(sets);
     estimate_correlation(sums);
     add_patches(sets, sums, HUGE_VAL);
@@ -143,26 +200,38 @@ void PatchMap::estimate_correlation(const std::vector<SurfaceSums>& sums) {
     }
 }
 
-// Every thread has its own rows.
+// Runs first; every thread has its own rows.
 std::vector<Pixels> PatchMap::pixels_of(const Array<int>& number, int count) const {
+    struct Run {
+        int begin, end;
+    };
     const auto n = static_cast<std::size_t>(count);
-    std::vector<std::vector<Pixels>> found(static_cast<std::size_t>(team_.size()), std::vector<Pixels>(n));
+    std::vector<std::vector<std::vector<Run>>> found(static_cast<std::size_t>(team_.size()),
+                                                     std::vector<std::vector<Run>>(n));
     parallel_for(image_.rows(), team_, [&](int first, int last, int thread) {
-        std::vector<Pixels>& own = found[static_cast<std::size_t>(thread)];
+        auto& own = found[static_cast<std::size_t>(thread)];
         for (int row = first; row < last; ++row) {
             Watch::checkpoint();
             for (int p = image_.index(row, 0), end = p + image_.cols(), next = p; p < end; p = next) {
-                while (next < end && label_[next] == label_[p]) ++next;
-                const int k = number[label_[p]];
-                for (int q = p; k && q < next; ++q) own[static_cast<std::size_t>(k - 1)].push_back(q);
+                const int label = label_[p];
+                while (next < end && label_[next] == label) ++next;
+                if (const int k = number[label]) own[static_cast<std::size_t>(k - 1)].push_back({p, next});
             }
         }
     });
-    std::vector<Pixels> sets = std::move(found.front());
+    std::vector<Pixels> sets(n);
     parallel_each(count, team_, [&](int i, int) {
         const auto k = static_cast<std::size_t>(i);
-        for (std::size_t t = 1; t < found.size(); ++t)
-            sets[k].insert(sets[k].end(), found[t][k].begin(), found[t][k].end());
+        std::size_t size = 0;
+        for (const auto& of_thread : found)
+            for (const Run& run : of_thread[k]) size += static_cast<std::size_t>(run.end - run.begin);
+        sets[k].resize(size);
+        auto to = sets[k].begin();
+        for (const auto& of_thread : found)
+            for (const Run& run : of_thread[k]) {
+                std::iota(to, to + (run.end - run.begin), run.begin);
+                to += run.end - run.begin;
+            }
     });
     return sets;
 }

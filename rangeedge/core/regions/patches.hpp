@@ -10,6 +10,7 @@
 #include "base/array.hpp"
 #include "base/disjoint_sets.hpp"
 #include "base/parallel.hpp"
+#include "regions/marks.hpp"
 #include "regions/surface.hpp"
 #include "regions/surface_image.hpp"
 #include "regions/tiles.hpp"
@@ -28,8 +29,10 @@ struct Patch {
 // Which patch every pixel of an image belongs to, and the patches themselves. Patch 0 is none.
 class PatchMap {
 public:
-    // What a pixel without a patch is: `reach` of a search is the last of them that it takes.
-    enum Free : std::uint8_t { taken, open_pixel, edge_pixel };
+    // What a pixel without a patch is, as the image states it: `reach` of a search is the last state that it takes.
+    using Free = SurfaceImage::State;
+    static constexpr Free taken = SurfaceImage::none, open_pixel = SurfaceImage::open_pixel,
+                          edge_pixel = SurfaceImage::edge_pixel;
 
     PatchMap(const RangeMap& map, Team& team);
 
@@ -57,10 +60,7 @@ public:
     }
 
     void take(int p, int i) { label_[p] = i, free_[p] = taken; }
-    void release(int p) {
-        label_[p] = 0;
-        free_[p] = image_.open(p) ? open_pixel : image_.valid(p) ? edge_pixel : taken;
-    }
+    void release(int p) { label_[p] = 0, free_[p] = image_.state(p); }
 
     // The patch whose surface is that of patch i, after patches were joined, and the one that names its region.
     int surface(int i) { return surfaces_.find(i); }
@@ -82,39 +82,26 @@ public:
     bool cut_roofs();
     void refit();
 
-    // Pixels of rows [first, last) whose patch is not that of their right or lower neighbour, in raster order.
+    // Visits pixels of rows [first, last) in raster order: those whose patch is not that of their right or lower
+    // neighbour,
     template <class F>
     void for_borders(int first, int last, F&& visit) const {
-        constexpr int block = 16;
-        const int stride = image_.stride();
-        Checkpoints checkpoints(64);
-        for (int row = first; row < last; ++row)
-            for (int p = image_.index(row, 0), end = p + image_.cols(); p < end; p += block) {
-                checkpoints.pass();
-                const int n = std::min(block, end - p);
-                const int* const label = &label_[p];
-                int differ = 0;
-                if (n == block)
-                    for (int k = 0; k < block; ++k)
-                        differ |= (label[k] ^ label[k + 1]) | (label[k] ^ label[k + stride]);
-                else
-                    differ = 1;
-                if (!differ) continue;
-                for (int k = 0; k < n; ++k)
-                    if (label[k] != label[k + 1] || label[k] != label[k + stride]) visit(p + k);
-            }
+        for_rows(first, last, [&](int p, std::uint8_t* marks) { mark_borders(p, marks); }, visit);
     }
-    // Free pixels of rows [first, last), in raster order; most images have few.
+    // those beside a pixel of another patch,
+    template <class F>
+    void for_rims(int first, int last, F&& visit) const {
+        for_rows(first, last, [&](int p, std::uint8_t* marks) { mark_rims(p, marks); }, visit);
+    }
+    // free ones,
     template <class F>
     void for_free(int first, int last, Free reach, F&& visit) const {
-        for (int p = image_.index(first, 0), end = image_.index(last, 0); p < end;) {
-            std::uint64_t eight = 1;
-            if (p + 8 <= end) std::memcpy(&eight, &free_[p], sizeof eight);
-            const int stop = eight ? std::min(p + 8, end) : p;
-            for (int q = p; q < stop; ++q)
-                if (is_free(q, reach)) visit(q);
-            p += 8;
-        }
+        for_rows(first, last, [&](int p, std::uint8_t* marks) { mark_free(p, reach, marks); }, visit);
+    }
+    // and free ones beside a pixel of a patch.
+    template <class F>
+    void for_touching(int first, int last, Free reach, F&& visit) const {
+        for_rows(first, last, [&](int p, std::uint8_t* marks) { mark_touching(p, reach, marks); }, visit);
     }
 
     static int refit_after(int count) { return count + count / 3 + 16; }
@@ -125,6 +112,24 @@ private:
         SurfaceSums sums;
         Surface surface;
     };
+
+    // Calls visit(p) for the pixels of rows that mark(first pixel of a row, marks) marks.
+    template <class Mark, class F>
+    void for_rows(int first, int last, Mark&& mark, F&& visit) const {
+        const int cols = image_.cols();
+        std::vector<std::uint8_t> marks(marks_size(cols));
+        for (int row = first; row < last; ++row) {
+            Watch::checkpoint();
+            const int begin = image_.index(row, 0);
+            mark(begin, marks.data());
+            for_marked(marks.data(), cols, [&](int col) { visit(begin + col); });
+        }
+    }
+    // Of the row that begins with pixel p.
+    void mark_borders(int p, std::uint8_t* marks) const;
+    void mark_rims(int p, std::uint8_t* marks) const;
+    void mark_free(int p, Free reach, std::uint8_t* marks) const;
+    void mark_touching(int p, Free reach, std::uint8_t* marks) const;
 
     void estimate_correlation(const std::vector<SurfaceSums>& sums);
     bool add_patches(const std::vector<Pixels>& sets, const std::vector<SurfaceSums>& sums, double limit);

@@ -40,11 +40,14 @@ bool add_uncovered(PatchMap& patches, PatchMap::Free reach, double limit) {
         });
     });
     if (std::none_of(any.begin(), any.end(), [](char found) { return found; })) return false;
-    const Components parts(inside.data(), image.rows(), image.cols());
+    const Components parts(inside.data(), image.rows(), image.cols(), patches.team());
     std::vector<Pixels> sets(static_cast<std::size_t>(parts.count()));
-    for (int i = 0; i < parts.count(); ++i)
+    parallel_each(parts.count(), patches.team(), [&](int i, int) {
+        Pixels& pixels = sets[static_cast<std::size_t>(i)];
+        pixels.reserve(static_cast<std::size_t>(parts.area(i)));
         for (const auto [begin, end] : parts.runs(i))
-            for (int p = begin; p < end; ++p) sets[static_cast<std::size_t>(i)].push_back(p);
+            for (int p = begin; p < end; ++p) pixels.push_back(p);
+    });
     return patches.add_patches(sets, limit);
 }
 
@@ -61,7 +64,7 @@ Components components_of(PatchMap& patches) {
     parallel_for(image.count(), patches.team(), [&](int begin, int end, int) {
         for (int p = begin; p < end; ++p) image[p] = region[patches[p]];
     });
-    return Components(image.data(), patches.image().rows(), patches.image().cols());
+    return Components(image.data(), patches.image().rows(), patches.image().cols(), patches.team());
 }
 
 void remove_small(PatchMap& patches, int min_area) {
@@ -74,13 +77,15 @@ void remove_small(PatchMap& patches, int min_area) {
 
 int write_labels(PatchMap& patches, std::int32_t* labels) {
     const SurfaceImage& image = patches.image();
-    std::fill(labels, labels + image.rows() * image.cols(), 0);
     const Components regions = components_of(patches);
-    for (int i = 0; i < regions.count(); ++i)
-        for (const auto [begin, end] : regions.runs(i)) {
-            const int row = begin / image.stride() - 1, col = begin % image.stride() - 1;
-            std::fill_n(labels + row * image.cols() + col, end - begin, i + 1);
-        }
+    parallel_for(image.rows(), patches.team(), [&](int first, int last, int) {
+        std::fill(labels + std::ptrdiff_t{first} * image.cols(), labels + std::ptrdiff_t{last} * image.cols(), 0);
+    });
+    parallel_each(regions.count(), patches.team(), [&](int i, int) {
+        for (const auto [begin, end] : regions.runs(i))
+            std::fill_n(labels + std::ptrdiff_t{regions.row_of(begin)} * image.cols() + regions.col_of(begin),
+                        end - begin, i + 1);
+    });
     return regions.count();
 }
 

@@ -11,19 +11,12 @@
 namespace rangeedge {
 namespace {
 
-constexpr double roof_gain = 0.97;  // two planes must lower the rms of the quadratic to this share
-constexpr double chance_gain = 4;   // by chance
-constexpr int roof_rounds = 8;
-constexpr double rounded = 2.5;  // pixels on either side of a ridge that may be rounded
-constexpr std::size_t most_samples = 2048;
+constexpr double roof_gain = 0.97;                // two planes must lower the rms of the quadratic to this share
+constexpr double chance_gain = 4;                 // by chance
+constexpr int roof_rounds = 8, roof_promise = 3;  // after which two planes are to be better
+constexpr double rounded = 2.5;                   // pixels on either side of a ridge that may be rounded
+constexpr std::size_t most_samples = 1024;
 const double pi = std::acos(-1.0);
-
-Surface plane_of(const std::vector<Sample>& samples) {
-    if (samples.empty()) return {};
-    SurfaceSums sums(samples.front().x, samples.front().y, samples.front().ordinate);
-    for (const Sample& s : samples) sums.add_to_plane(s);
-    return sums.plane();
-}
 
 struct Roof {
     Surface first, second;
@@ -37,42 +30,53 @@ struct Roof {
 }  // namespace
 
 bool split_roof(const SurfaceImage& image, const Pixels& pixels, const Surface& curved, Pixels& first, Pixels& second) {
-    std::vector<Sample> samples;
+    struct Point {
+        Sample at;
+        double misfit;  // squared, of the quadratic
+    };
+    std::vector<Point> points;
     const std::size_t step = pixels.size() / most_samples + 1;
-    for (std::size_t k = 0; k < pixels.size(); k += step) samples.push_back(image.sample(pixels[k]));
+    points.reserve(pixels.size() / step + 1);
+    for (std::size_t k = 0; k < pixels.size(); k += step) {
+        const Sample s = image.sample(pixels[k]);
+        const double r = s.ordinate - curved.value(s.x, s.y);
+        points.push_back({s, s.weight * r * r});
+    }
 
     const double xx = curved.c[3], xy = curved.c[4] / 2, yy = curved.c[5];
     const double mean = (xx + yy) / 2, root = std::hypot((xx - yy) / 2, xy);
     Roof roof{{}, {}, std::abs(mean - root) > std::abs(mean + root)};
     const double across = 0.5 * std::atan2(2 * xy, xx - yy) + (roof.convex ? pi / 2 : 0);
     const double cx = std::cos(across), cy = std::sin(across);
-    // The ridge itself may be rounded: neither fits nor the comparison count the pixels along it.
-    std::vector<Sample> side_a, side_b;
-    for (const Sample& s : samples)
-        ((s.x - curved.x0) * cx + (s.y - curved.y0) * cy < 0 ? side_a : side_b).push_back(s);
-    const std::size_t least = std::max<std::size_t>(static_cast<std::size_t>(least_pixels) / step, 4);
+    const SurfaceSums none(curved.x0, curved.y0, curved.c[0]);
+    SurfaceSums side_a = none, side_b = none;
+    for (const auto& [s, misfit] : points)
+        ((s.x - curved.x0) * cx + (s.y - curved.y0) * cy < 0 ? side_a : side_b).add_to_plane(s);
+    const int least = std::max(least_pixels / static_cast<int>(step), 4);
     double of_roof = 0, of_curved = 0;
     for (int round = 0; round < roof_rounds; ++round) {
         Watch::checkpoint();
-        if (side_a.size() < least || side_b.size() < least) return false;
-        roof.first = plane_of(side_a), roof.second = plane_of(side_b);
+        if (side_a.count() < least || side_b.count() < least) return false;
+        roof.first = side_a.plane(), roof.second = side_b.plane();
         const double bend = std::hypot(roof.first.c[1] - roof.second.c[1], roof.first.c[2] - roof.second.c[2]);
-        const std::size_t before = side_a.size();
-        side_a.clear(), side_b.clear();
+        const int before = side_a.count();
+        side_a = side_b = none;
         of_roof = of_curved = 0;
-        for (const Sample& s : samples) {
+        for (const auto& [s, misfit] : points) {
             const double a = roof.first.value_on_plane(s.x, s.y), b = roof.second.value_on_plane(s.x, s.y);
+            // The ridge itself may be rounded: neither fits nor the comparison count the pixels along it.
             if (std::abs(a - b) < rounded * bend) continue;
             const bool on_a = roof.in_first(a, b);
-            (on_a ? side_a : side_b).push_back(s);
-            const double r = s.ordinate - (on_a ? a : b), q = s.ordinate - curved.value(s.x, s.y);
-            of_roof += s.weight * r * r, of_curved += s.weight * q * q;
+            (on_a ? side_a : side_b).add_to_plane(s);
+            const double r = s.ordinate - (on_a ? a : b);
+            of_roof += s.weight * r * r, of_curved += misfit;
         }
-        if (round && side_a.size() == before) break;
+        if (round && side_a.count() == before) break;
+        if (round == roof_promise && of_roof > of_curved) return false;
     }
     const double chance = chance_gain * image.correlation_area() / static_cast<double>(pixels.size());
     const double gain = std::max(1 - roof_gain * roof_gain, chance);
-    if (side_a.size() < least || side_b.size() < least || of_roof >= (1 - gain) * of_curved) return false;
+    if (side_a.count() < least || side_b.count() < least || of_roof >= (1 - gain) * of_curved) return false;
     first.clear(), second.clear();
     Checkpoints checkpoints;
     for (const int p : pixels) {

@@ -3,9 +3,11 @@
 // lower pixel is highest. The best way between two summits goes from basin to basin over passes, since within a basin
 // it only goes up and down again. So a few summits and passes tell what all the pixels do. Passes are taken in falling
 // order, as water that sinks uncovers them: each joins two islands, and the lower of their peaks counts by itself if
-// the pass is low beside it.
+// the pass is low beside it. The seed of a peak is what rises above its share in the basins that have joined its
+// island by then.
 //
-// Ways uphill are followed in bands of rows, in parallel: within its band first, then from band to band.
+// Nothing is kept of a pixel but its marker, which is first the neighbour uphill, then the basin. Ways uphill are
+// followed in bands of rows, in parallel: within its band first, then from band to band.
 // SPDX-License-Identifier: Apache-2.0
 #include "regions/seeds.hpp"
 
@@ -14,7 +16,6 @@
 #include <cstddef>
 #include <cstring>
 #include <limits>
-#include <memory>
 #include <utility>
 #include <vector>
 
@@ -22,11 +23,12 @@
 #include "base/disjoint_sets.hpp"
 #include "base/parallel.hpp"
 #include "base/simd.hpp"
+#include "regions/marks.hpp"
 
 namespace rangeedge {
 namespace {
 
-// The bits of floats >= 0 are ordered as their values are, and compared faster.
+// The bits of floats >= 0 are ordered as their values are, and compared faster: the level of a pixel.
 std::int32_t bits_of(float value) {
     std::int32_t bits;
     std::memcpy(&bits, &value, sizeof bits);
@@ -38,204 +40,217 @@ float value_of(std::int32_t bits) {
     return value;
 }
 
-// Bits of the distances of a row; 0 where there is no pixel.
-RANGEEDGE_WIDE void keep_levels(const float* distance, const std::uint8_t* mask, int n, float lowest,
+// A marker on the way: an index uphill; or `no_pixel`; or less than that, of a basin by number.
+constexpr int no_pixel = -1;
+constexpr bool is_basin(int marker) { return marker < no_pixel; }
+constexpr int basin_of(int marker) { return -2 - marker; }
+constexpr int marker_of(int basin) { return -2 - basin; }
+
+// ---- Loops over the pixels of a row ----
+
+// Levels of a row of distances; 0 where there is no pixel.
+RANGEEDGE_WIDE void read_levels(const float* distance, const std::uint8_t* mask, int n, float lowest,
                                 std::int32_t* level) {
     for (int k = 0; k < n; ++k) level[k] = distance[k] > 0 && !(distance[k] < lowest) ? bits_of(distance[k]) : 0;
     for (int k = 0; mask && k < n; ++k) level[k] = mask[k] ? level[k] : 0;
 }
 
-// Where a row of neighbours is higher than what was found so far, they and the step to them take its place.
-RANGEEDGE_WIDE void keep_highest(const std::int32_t* __restrict beside, std::int32_t step, int n,
-                                 std::int32_t* __restrict highest, std::int32_t* __restrict to) {
-    for (int k = 0; k < n; ++k) {
-        const std::int32_t better = -(beside[k] > highest[k]);
-        highest[k] = (beside[k] & better) | (highest[k] & ~better);
-        to[k] = (step & better) | (to[k] & ~better);
+// Every pixel's highest neighbour, or itself; of equally high ones the first in raster order. `first` is the index of
+// the row's first pixel, `cols` what lies between the indices of two rows.
+RANGEEDGE_WIDE void look_uphill(const std::int32_t* above, const std::int32_t* own, const std::int32_t* below,
+                                int first, int cols, int* __restrict uphill) {
+    for (int k = 0; k < cols; ++k) {
+        std::int32_t top = above[k - 1], step = -cols - 1;
+        const auto see = [&](std::int32_t level, int to) RANGEEDGE_ALWAYS {
+            step = level > top ? to : step;
+            top = std::max(top, level);
+        };
+        see(above[k], -cols);
+        see(above[k + 1], -cols + 1);
+        see(own[k - 1], -1);
+        see(own[k], 0);
+        see(own[k + 1], 1);
+        see(below[k - 1], cols - 1);
+        see(below[k], cols);
+        see(below[k + 1], cols + 1);
+        uphill[k] = own[k] > 0 ? first + k + step : no_pixel;
     }
 }
 
-// Marks the pixels of a row from which one of the four neighbours after it differs.
-RANGEEDGE_WIDE void mark_borders(const int* __restrict own, int stride, int n, std::uint8_t* __restrict differ) {
-    const int* const below = own + stride;
-    for (int k = 0; k < n; ++k) {
+// Marks the pixels of basins in a row from which one of the four neighbours after it may differ.
+RANGEEDGE_WIDE void mark_borders(const int* __restrict own, const int* __restrict below, int n,
+                                 std::uint8_t* __restrict differ) {
+    differ[0] = differ[n - 1] = 1;  // a neighbour may lie beyond the end of the row
+    for (int k = 1; k < n - 1; ++k) {
         const int a = own[k];
-        differ[k] = ((a ^ own[k + 1]) | (a ^ below[k - 1]) | (a ^ below[k]) | (a ^ below[k + 1])) != 0;
+        const bool alike = ((a ^ own[k + 1]) | (a ^ below[k - 1]) | (a ^ below[k]) | (a ^ below[k + 1])) == 0;
+        differ[k] = !alike & is_basin(a);
     }
 }
 
-// Calls visit(k) where a mark is set; marks are followed by eight more bytes.
-template <class F>
-void for_marked(const std::uint8_t* marks, int n, F&& visit) {
-    std::uint64_t eight;
-    for (int k = 0; k < n; k += static_cast<int>(sizeof eight)) {
-        std::memcpy(&eight, marks + k, sizeof eight);
-        if (!eight) continue;
-        for (int i = k; i < std::min(k + static_cast<int>(sizeof eight), n); ++i)
-            if (marks[i]) visit(i);
-    }
-}
+// ---- Distances as a landscape ----
 
 struct Pass {
-    std::int32_t level;  // bits of its distance
-    int a, b;            // summits on either side, by number; a < b
+    std::int32_t level;
+    int a, b;  // basins on either side, a < b
 
     bool same_sides(const Pass& other) const { return a == other.a && b == other.b; }
 };
 
-// A distance map in an image with a margin of one pixel; 0 is no pixel. Where it wraps, the margin beside the first
-// column is a copy of the last column and the other way round, and `own` tells the pixel itself.
-class DistanceImage {
-public:
-    DistanceImage(const float* distance, const std::uint8_t* mask, int rows, int cols, bool wrap, float lowest,
-                  Team& team)
-        : rows_(rows), cols_(cols), wrap_(wrap), team_(team), level_((rows + 2) * stride(), 0) {
-        parallel_for(rows, team, [&](int first, int last, int) {
-            for (int row = first; row < last; ++row) {
-                const std::ptrdiff_t begin = static_cast<std::ptrdiff_t>(row) * cols;
-                keep_levels(distance + begin, mask ? mask + begin : nullptr, cols, lowest, &level_[index(row, 0)]);
-            }
-        });
-        copy_around(level_);
-    }
-
-    int stride() const { return cols_ + 2; }
-    int index(int row, int col) const { return (row + 1) * stride() + col + 1; }
-    int size() const { return level_.count(); }
-    int own(int p) const {
-        if (!wrap_) return p;
-        const int col = p % stride();
-        return col == 0 ? p + cols_ : col > cols_ ? p - cols_ : p;
-    }
-    float operator[](int p) const { return value_of(level_[p]); }
-    bool reaches(int p, std::int32_t least) const { return level_[p] >= least; }
-    std::array<int, 8> neighbours() const {
-        const int s = stride();
-        return {-s - 1, -s, -s + 1, -1, 1, s - 1, s, s + 1};
-    }
-    // Of two pixels of one distance, that of lower index is the higher.
-    bool higher(int p, int q) const { return level_[p] > level_[q] || (level_[p] == level_[q] && p < q); }
-
-    // The number of every pixel's summit, -1 of no pixel; and all summits in raster order.
-    struct Basins {
-        Array<int> summit;
-        std::vector<int> summits;
-    };
-    Basins basins() const;
-    std::vector<Pass> passes(const Array<int>& summit) const;
-    template <class F>
-    void for_pixels(int first, int last, F&& visit) const {
-        for (int row = first; row < last; ++row) {
-            Watch::checkpoint();
-            for (int p = index(row, 0), end = p + cols_; p < end; ++p)
-                if (level_[p] > 0) visit(p);
-        }
-    }
-    int rows() const { return rows_; }
-
-private:
-    void copy_around(Array<std::int32_t>& values) const {
-        for (int row = 0; wrap_ && row < rows_; ++row) {
-            const int first = index(row, 0), last = index(row, cols_ - 1);
-            values[first - 1] = values[last], values[last + 1] = values[first];
-        }
-    }
-    // The highest of a pixel and its neighbours.
-    int highest_around(int p) const {
-        int top = p;
-        for (const int step : neighbours())
-            if (const int q = own(p + step); higher(q, top)) top = q;
-        return top;
-    }
-
-    int rows_, cols_;
-    bool wrap_;
-    Team& team_;
-    Array<std::int32_t> level_;  // bits of distances
+// What there is of a seed in a basin: the pixels that reach a level. Number 0 is none.
+struct Seed {
+    int number = 0;
+    std::int32_t least = 0;
 };
 
-DistanceImage::Basins DistanceImage::basins() const {
-    Basins basins{Array<int>(level_.size(), 0), {}};
-    Array<int>& uphill = basins.summit;
-    const auto around = neighbours();
-    // Of every thread, in raster order: summits, and pixels from which the way leads into another band.
+class Landscape {
+public:
+    Landscape(const float* distance, const std::uint8_t* mask, int rows, int cols, bool wrap, float lowest, Team& team,
+              std::int32_t* markers)
+        : distance_(distance), mask_(mask), rows_(rows), cols_(cols), wrap_(wrap), lowest_(lowest), team_(team),
+          markers_(markers) {}
+
+    // Markers become basins. Returns their summits, in raster order.
+    Array<int> find_basins();
+    // The highest pass between any two basins that touch, and some lower ones; the highest first. Those that are lower
+    // than `share` of the summits on both sides are left out: a way over one of them leads to no peak that counts.
+    std::vector<Pass> find_passes(const Array<float>& share) const;
+    // Markers become numbers of seeds, of which there are `count`, by what there is of them in the basins; and these
+    // are numbered anew, in raster order of their first pixels.
+    void paint(const Array<Seed>& seeds, int count);
+
+    // Of two pixels of one distance, that of lower index is the higher.
+    bool higher(int p, int q) const { return distance_[p] > distance_[q] || (distance_[p] == distance_[q] && p < q); }
+    float operator[](int p) const { return distance_[p]; }
+
+private:
+    // Levels of the rows around one, with a margin of one pixel: 0, or where the image wraps a copy of the other side.
+    class Levels {
+    public:
+        explicit Levels(const Landscape& of) : of_(of) {
+            for (Array<std::int32_t>& row : rows_) row.resize(of.cols_ + 2);
+        }
+        void read(int row) {
+            Array<std::int32_t>& levels = rows_[slot(row)];
+            if (row < 0 || row >= of_.rows_) return levels.assign(levels.size(), 0);
+            const std::ptrdiff_t begin = of_.index(row, 0);
+            read_levels(of_.distance_ + begin, of_.mask_ ? of_.mask_ + begin : nullptr, of_.cols_, of_.lowest_,
+                        &levels[1]);
+            levels[0] = of_.wrap_ ? levels[of_.cols_] : 0;
+            levels[of_.cols_ + 1] = of_.wrap_ ? levels[1] : 0;
+        }
+        const std::int32_t* operator[](int row) const { return &rows_[slot(row)][1]; }
+
+    private:
+        static std::size_t slot(int row) { return static_cast<std::size_t>(row + 3) % 3; }
+
+        const Landscape& of_;
+        std::array<Array<std::int32_t>, 3> rows_;
+    };
+
+    int index(int row, int col) const { return row * cols_ + col; }
+    int around(int col) const { return col < 0 ? col + cols_ : col < cols_ ? col : col - cols_; }
+    std::int32_t level(int p) const { return bits_of(distance_[p]); }
+
+    void look_uphill_in(int first, int last) const;
+    int highest_around(const Levels& levels, int row, int col) const;
+
+    const float* distance_;
+    const std::uint8_t* mask_;
+    int rows_, cols_;
+    bool wrap_;
+    float lowest_;
+    Team& team_;
+    std::int32_t* markers_;
+};
+
+void Landscape::look_uphill_in(int first, int last) const {
+    Levels levels(*this);
+    levels.read(first - 1);
+    levels.read(first);
+    for (int row = first; row < last; ++row) {
+        levels.read(row + 1);
+        int* const uphill = markers_ + index(row, 0);
+        look_uphill(levels[row - 1], levels[row], levels[row + 1], index(row, 0), cols_, uphill);
+        if (!wrap_) continue;
+        for (const int col : {0, cols_ - 1})
+            if (levels[row][col] > 0) uphill[col] = highest_around(levels, row, col);
+    }
+}
+
+// The highest of a pixel and its neighbours, some of them at the other side of the image.
+int Landscape::highest_around(const Levels& levels, int row, int col) const {
+    int top = index(row, col);
+    for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx)
+            if (levels[row + dy][col + dx] > 0)
+                if (const int q = index(row + dy, around(col + dx)); higher(q, top)) top = q;
+    return top;
+}
+
+Array<int> Landscape::find_basins() {
     struct Found {
-        std::vector<int> summits, exits;
+        std::vector<int> summits, exits;  // exits: pixels from where the way leaves the band
     };
     std::vector<Found> found(static_cast<std::size_t>(team_.size()));
     parallel_for(rows_, team_, [&](int first, int last, int thread) {
-        // A row at a time, without branches, so that many pixels are compared at once.
-        std::vector<std::int32_t> top(static_cast<std::size_t>(cols_));
-        for (int row = first; row < last; ++row) {
-            const int begin = index(row, 0);
-            const std::int32_t* const own = &level_[begin];
-            int* const to = &uphill[begin];
-            std::fill(top.begin(), top.end(), -1);
-            for (std::size_t k = 0; k < 4; ++k)
-                keep_highest(own + around[k], around[k], cols_, top.data(), to);  // of lower index: higher where equal
-            keep_highest(own, 0, cols_, top.data(), to);
-            for (std::size_t k = 4; k < 8; ++k) keep_highest(own + around[k], around[k], cols_, top.data(), to);
-            for (int k = 0; k < cols_; ++k) to[k] += begin + k;
-            if (!wrap_) continue;
-            for (const int k : {0, cols_ - 1}) to[k] = highest_around(begin + k);  // of copies the index is another
-        }
-        // Ways are shortened while they are followed.
+        look_uphill_in(first, last);
+        // Ways are shortened once they are followed: they lead to a summit or an exit at once.
         auto& [summits, exits] = found[static_cast<std::size_t>(thread)];
-        const int band_begin = index(first, 0), band_end = index(last, 0);
-        const auto leaves = [=](int q) { return q < band_begin || q >= band_end; };
-        int* const up = uphill.data();
-        for_pixels(first, last, [&, up](int p) {
-            if (up[p] == p) {
+        const int begin = index(first, 0), end = index(last, 0);
+        const auto leaves = [=](int q) { return q < begin || q >= end; };
+        int* const up = markers_;
+        Checkpoints checkpoints;
+        for (int p = begin; p < end; ++p) {
+            checkpoints.pass();
+            int q = up[p];
+            if (q == no_pixel) continue;
+            if (q == p) {
                 summits.push_back(p);
-            } else if (leaves(up[p])) {
+            } else if (leaves(q)) {
                 exits.push_back(p);
             } else {
-                int q = up[p];
-                for (int next = up[q]; next != q && !leaves(next); next = up[q]) {
-                    if (!leaves(up[next])) up[q] = up[next];
-                    q = next;
-                }
-                up[p] = q;
+                for (int next = up[q]; next != q && !leaves(next); next = up[q]) q = next;
+                for (int r = p; r != q;) r = std::exchange(up[r], q);
             }
-        });
-    });
-    for (const Found& of_thread : found) {
-        basins.summits.insert(basins.summits.end(), of_thread.summits.begin(), of_thread.summits.end());
-        for (const int p : of_thread.exits) {
-            int q = p;
-            while (uphill[q] != q) q = uphill[q] = uphill[uphill[q]];
-            uphill[p] = q;
         }
-    }
-    const std::unique_ptr<int[]> number(new int[static_cast<std::size_t>(uphill.size())]);  // at summits alone
-    for (std::size_t k = 0; k < basins.summits.size(); ++k)
-        number[static_cast<std::size_t>(basins.summits[k])] = static_cast<int>(k);
-    Array<int> summit(level_.size(), -1);
-    parallel_for(rows_, team_, [&](int first, int last, int) {
-        for_pixels(first, last, [&](int p) {
-            int q = uphill[p];
-            while (uphill[q] != q) q = uphill[q];
-            summit[p] = number[static_cast<std::size_t>(q)];
-        });
     });
-    copy_around(summit);
-    uphill.swap(summit);
-    return basins;
+    Array<int> summits;
+    for (const Found& of_thread : found)
+        for (const int p : of_thread.summits) {
+            markers_[p] = marker_of(summits.count());
+            summits.push_back(p);
+        }
+    Checkpoints checkpoints;
+    for (const Found& of_thread : found)
+        for (const int p : of_thread.exits) {
+            checkpoints.pass();
+            int q = p;
+            while (!is_basin(markers_[q])) q = markers_[q];
+            markers_[p] = markers_[q];
+        }
+    parallel_for(rows_, team_, [&](int first, int last, int) {
+        int* const own = markers_;
+        RANGEEDGE_INDEPENDENT  // of what is neither summit nor exit
+            for (int p = index(first, 0); p < index(last, 0); ++p) if (own[p] >= 0) own[p] = own[own[p]];
+    });
+    return summits;
 }
 
-// The highest pass between any two basins that touch, and some lower ones; the highest first.
-std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
+std::vector<Pass> Landscape::find_passes(const Array<float>& share) const {
     struct Found {
         std::vector<Pass> passes;
         std::array<std::size_t, 256> recent{};  // places of passes found lately, by their sides
     };
     std::vector<Found> found(static_cast<std::size_t>(team_.size()));
-    const std::array<int, 4> forward{1, stride() - 1, stride(), stride() + 1};
     parallel_for(rows_, team_, [&](int first, int last, int thread) {
         auto& [passes, recent] = found[static_cast<std::size_t>(thread)];
-        const auto add = [&passes = passes, &recent = recent](const Pass& pass) {
-            const auto slot =
-                (31 * static_cast<std::size_t>(pass.a) + static_cast<std::size_t>(pass.b)) % recent.size();
+        const auto see = [&, this, &passes = passes, &recent = recent](int p, int q) {
+            if (markers_[p] == markers_[q] || !is_basin(markers_[q])) return;
+            const auto [a, b] = std::minmax({basin_of(markers_[p]), basin_of(markers_[q])});
+            const Pass pass{std::min(level(p), level(q)), a, b};
+            if (value_of(pass.level) < std::min(share[a], share[b])) return;
+            const std::size_t slot = (31 * static_cast<std::size_t>(a) + static_cast<std::size_t>(b)) % recent.size();
             const std::size_t k = recent[slot];
             if (k < passes.size() && passes[k].same_sides(pass)) {
                 passes[k].level = std::max(passes[k].level, pass.level);
@@ -244,19 +259,20 @@ std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
                 passes.push_back(pass);
             }
         };
-        std::vector<std::uint8_t> differ(static_cast<std::size_t>(cols_) + sizeof(std::uint64_t));
+        std::vector<std::uint8_t> differ(marks_size(cols_));
         for (int row = first; row < last; ++row) {
             Watch::checkpoint();
-            const int begin = index(row, 0);
-            mark_borders(&summit[begin], stride(), cols_, differ.data());
+            const int *const own = markers_ + index(row, 0), *const below = row + 1 < rows_ ? own + cols_ : own;
+            mark_borders(own, below, cols_, differ.data());
             for_marked(differ.data(), cols_, [&](int col) {
-                const int p = begin + col, a = summit[p];
-                if (a < 0) return;
-                for (const int step : forward) {
-                    const int b = summit[p + step];
-                    if (a == b || b < 0) continue;
-                    add({std::min(level_[p], level_[p + step]), std::min(a, b), std::max(a, b)});
-                }
+                const int p = index(row, col);
+                if (!is_basin(own[col])) return;
+                const bool left = wrap_ || col > 0, right = wrap_ || col + 1 < cols_;
+                if (right) see(p, index(row, around(col + 1)));
+                if (row + 1 == rows_) return;
+                if (left) see(p, index(row + 1, around(col - 1)));
+                see(p, p + cols_);
+                if (right) see(p, index(row + 1, around(col + 1)));
             });
         }
     });
@@ -270,25 +286,35 @@ std::vector<Pass> DistanceImage::passes(const Array<int>& summit) const {
     return all;
 }
 
-// Summits that count by themselves.
-std::vector<int> peaks(const DistanceImage& image, const DistanceImage::Basins& basins, float separation) {
-    // Islands are known by the number of their highest summit, in raster order.
-    const std::vector<int>& summits = basins.summits;
-    DisjointSets islands(static_cast<int>(summits.size()));
-    const auto at = [&](int i) { return summits[static_cast<std::size_t>(i)]; };
-    std::vector<int> found;
-    Checkpoints checkpoints;
-    for (const Pass& pass : image.passes(basins.summit)) {
-        checkpoints.pass();
-        int low = islands.find(pass.a), high = islands.find(pass.b);
-        if (low == high) continue;
-        if (image.higher(at(low), at(high))) std::swap(low, high);
-        if (value_of(pass.level) < separation * image[at(low)]) found.push_back(at(low));
-        islands.link(low, high);
+void Landscape::paint(const Array<Seed>& seeds, int count) {
+    constexpr int nowhere = std::numeric_limits<int>::max();
+    std::vector<Array<int>> first_pixels(static_cast<std::size_t>(team_.size()), Array<int>(count + 1, nowhere));
+    parallel_for(rows_, team_, [&](int first, int last, int thread) {
+        Array<int>& first_pixel = first_pixels[static_cast<std::size_t>(thread)];
+        int before = 0;
+        for (int p = index(first, 0); p < index(last, 0); ++p) {
+            int own = 0;
+            if (is_basin(markers_[p])) {
+                const Seed& seed = seeds[basin_of(markers_[p])];
+                own = level(p) >= seed.least ? seed.number : 0;
+            }
+            markers_[p] = own;
+            if (own != before) first_pixel[own] = std::min(first_pixel[own], p);
+            before = own;
+        }
+    });
+    Array<int>& first_pixel = first_pixels.front();
+    std::vector<int> order;
+    for (int s = 1; s <= count; ++s) {
+        for (const Array<int>& of_thread : first_pixels) first_pixel[s] = std::min(first_pixel[s], of_thread[s]);
+        order.push_back(s);
     }
-    for (int i = 0; i < islands.size(); ++i)
-        if (islands.is_root(i)) found.push_back(at(i));
-    return found;
+    std::sort(order.begin(), order.end(), [&](int a, int b) { return first_pixel[a] < first_pixel[b]; });
+    Array<int> number(count + 1, 0);
+    for (int n = 0; n < count; ++n) number[order[static_cast<std::size_t>(n)]] = n + 1;
+    parallel_for(rows_, team_, [&](int first, int last, int) {
+        for (int p = index(first, 0); p < index(last, 0); ++p) markers_[p] = number[markers_[p]];
+    });
 }
 
 }  // namespace
@@ -296,51 +322,49 @@ std::vector<int> peaks(const DistanceImage& image, const DistanceImage::Basins& 
 int extract_seeds(const float* distance, const std::uint8_t* mask, int height, int width, bool wrap, float min_distance,
                   float separation, int threads, std::int32_t* markers) {
     Team team(threads);
-    const DistanceImage image(distance, mask, height, width, wrap, separation * min_distance, team);
-    std::vector<int> wanted;
-    for (const int peak : peaks(image, image.basins(), separation))
-        if (!(image[peak] < min_distance)) wanted.push_back(peak);
-    const int seeds = static_cast<int>(wanted.size());
-    // Flood every seed from its peak. As they never touch, this may happen at once.
-    Array<int> seed(image.size(), 0), first(seeds);
-    parallel_each(seeds, team, [&](int s, int) {
-        const int peak = wanted[static_cast<std::size_t>(s)];
+    Landscape landscape(distance, mask, height, width, wrap, separation * min_distance, team, markers);
+    const Array<int> summits = landscape.find_basins();
+    const int count = summits.count();
+    Array<float> share(count);
+    for (int i = 0; i < count; ++i) share[i] = separation * landscape[summits[i]];
+
+    // Islands are known by the number of their highest summit.
+    struct Join {
+        int low, high;
+        std::int32_t level;
+    };
+    std::vector<Join> joins;
+    DisjointSets islands(count);
+    Checkpoints checkpoints;
+    for (const Pass& pass : landscape.find_passes(share)) {
+        checkpoints.pass();
+        int low = islands.find(pass.a), high = islands.find(pass.b);
+        if (low == high) continue;
+        if (landscape.higher(summits[low], summits[high])) std::swap(low, high);
+        islands.link(low, high);
+        joins.push_back({low, high, pass.level});
+    }
+
+    // An island joined another one after all that had joined itself.
+    Array<Seed> seeds(count);
+    int found = 0;
+    const auto found_peak = [&](int summit) {
+        if (landscape[summits[summit]] < min_distance) return;
         // Where all is infinitely far, or `separation` vanishes in single precision, nothing but no pixel is too low.
-        const float share = separation * image[peak];
-        const std::int32_t least = bits_of(share > 0 ? share : std::numeric_limits<float>::denorm_min());
-        const auto around = image.neighbours();
-        seed[peak] = s + 1;
-        std::vector<int> stack(1, peak);
-        int lowest = peak;
-        Checkpoints checkpoints;
-        while (!stack.empty()) {
-            checkpoints.pass();
-            const int p = stack.back();
-            stack.pop_back();
-            lowest = std::min(lowest, p);
-            for (const int step : around) {
-                const int q = image.own(p + step);
-                if (!image.reaches(q, least) || seed[q]) continue;
-                seed[q] = s + 1;
-                stack.push_back(q);
-            }
-        }
-        first[s] = lowest;
-    });
-    // Number them by their first pixels.
-    Array<int> number(seeds + 1, 0);
-    std::vector<int> order(wanted.size());
-    for (int s = 0; s < seeds; ++s) order[static_cast<std::size_t>(s)] = s;
-    std::sort(order.begin(), order.end(), [&](int a, int b) { return first[a] < first[b]; });
-    for (int n = 0; n < seeds; ++n) number[order[static_cast<std::size_t>(n)] + 1] = n + 1;
-    parallel_for(height, team, [&](int begin, int end, int) {
-        for (int row = begin; row < end; ++row) {
-            const int* const own = &seed[image.index(row, 0)];
-            std::int32_t* const to = markers + static_cast<std::ptrdiff_t>(row) * width;
-            for (int col = 0; col < width; ++col) to[col] = number[own[col]];
-        }
-    });
-    return seeds;
+        const float least = std::max(share[summit], std::numeric_limits<float>::denorm_min());
+        seeds[summit] = {++found, bits_of(least)};
+    };
+    for (int i = 0; i < count; ++i)
+        if (islands.is_root(i)) found_peak(i);
+    for (std::size_t k = joins.size(); k-- > 0;) {
+        const auto [low, high, level] = joins[k];
+        if (value_of(level) < share[low])
+            found_peak(low);
+        else if (level >= seeds[high].least)
+            seeds[low] = seeds[high];
+    }
+    landscape.paint(seeds, found);
+    return found;
 }
 
 }  // namespace rangeedge

@@ -14,53 +14,100 @@ constexpr double flat = 1.25;        // rms in standard deviations up to which a
 constexpr double resolution = 1e-6;  // of ordinates in single precision
 constexpr int sample_step = 61;      // one pixel in so many tells the typical noise
 
+// The least and the greatest of n ordinates and 0, each in as many lanes; NaN and infinities do not count.
+constexpr int lanes = 16;
 struct Range {
-    float low = 0, high = 0;
+    float low[lanes]{}, high[lanes]{};
+
+    double extent() const {
+        return static_cast<double>(*std::max_element(high, high + lanes)) -
+               static_cast<double>(*std::min_element(low, low + lanes));
+    }
 };
+
+RANGEEDGE_WIDE void extend(Range& range, const float* ordinate, int n) {
+    Range r = range;
+    const auto extend_lane = [&](int k, float value) RANGEEDGE_ALWAYS {
+        const float f = std::isfinite(value) ? value : 0.0f;
+        r.low[k] = f < r.low[k] ? f : r.low[k], r.high[k] = f > r.high[k] ? f : r.high[k];
+    };
+    int i = 0;
+    for (; i + lanes <= n; i += lanes)
+        for (int k = 0; k < lanes; ++k) extend_lane(k, ordinate[i + k]);
+    for (; i < n; ++i) extend_lane(0, ordinate[i]);
+    range = r;
+}
+
+// The standard deviations of n pixels from `first`.
+RANGEEDGE_WIDE void deviations(const RangeMap& map, std::int64_t first, int n, double least, double* __restrict sigma) {
+    const float* const ordinate = map.ordinate + first;
+    const Noise& noise = map.noise;
+    const double offset = map.offset;
+    const bool projective = map.projective;
+    for (int k = 0; k < n; ++k) {
+        const double s = noise.sigma(offset + static_cast<double>(ordinate[k]), first + k, projective);
+        sigma[k] = s > least ? s : least;
+    }
+}
 
 }  // namespace
 
 SurfaceImage::SurfaceImage(const RangeMap& map, double lateral, Team& team)
     : rows_(map.rows), cols_(map.cols), projective_(map.projective), regular_(!map.x && !map.y), lateral_(lateral),
-      offset_(map.offset), to_plane_(map.to_plane), pixel_(new Pixel[static_cast<std::size_t>(size())]),
-      state_(size(), none) {
+      offset_(map.offset), to_plane_(map.to_plane), pixel_(static_cast<std::size_t>(size())), state_(size(), none) {
     Array<Range> ranges(team.size());
-    parallel_for(rows_ * cols_, team, [&](int begin, int end, int thread) {
-        Range& range = ranges[thread];
-        for (int k = begin; k < end; ++k) {
-            const float f = std::isfinite(map.ordinate[k]) ? map.ordinate[k] : 0.0f;
-            range.low = std::min(range.low, f), range.high = std::max(range.high, f);
-        }
+    parallel_for(rows_, team, [&](int first, int last, int thread) {
+        extend(ranges[thread], map.ordinate + first * cols_, (last - first) * cols_);
     });
     Range all;
-    for (const Range& r : ranges) all = {std::min(all.low, r.low), std::max(all.high, r.high)};
-    const double extent = static_cast<double>(all.high) - static_cast<double>(all.low);
-    const double least = std::max({resolution * extent, map.rounding, std::numeric_limits<double>::min()});
-    const auto sigma = [&](int k) {
-        return std::max(map.noise.sigma(offset_ + static_cast<double>(map.ordinate[k]), k, projective_), least);
-    };
+    for (const Range& r : ranges) extend(all, r.low, lanes), extend(all, r.high, lanes);
+    const double least = std::max({resolution * all.extent(), map.rounding, std::numeric_limits<double>::min()});
     std::vector<double> sigmas;
     for (int k = 0; k < rows_ * cols_; k += sigmas.empty() ? 1 : sample_step - k % sample_step)
-        if (std::isfinite(map.ordinate[k])) sigmas.push_back(sigma(k));
+        if (std::isfinite(map.ordinate[k])) deviations(map, k, 1, least, &sigmas.emplace_back());
     if (sigmas.empty()) sigmas.push_back(1);
     const auto middle = sigmas.begin() + static_cast<std::ptrdiff_t>(sigmas.size() / 2);
     std::nth_element(sigmas.begin(), middle, sigmas.end());
     unit_ = *middle;
-    const double per_unit = 1 / unit_;
     // Every thread writes its rows first, so that it also is the one that has their memory allocated.
     parallel_for(rows_ + 2, team, [&](int first, int last, int) {
-        std::fill_n(&pixel_[static_cast<std::size_t>(first * stride())], (last - first) * stride(), Pixel{});
-        for (int row = std::max(first - 1, 0); row < std::min(last - 1, rows_); ++row)
-            for (int col = 0; col < cols_; ++col) {
-                const int k = row * cols_ + col, p = index(row, col);
-                if (!std::isfinite(map.ordinate[k])) continue;
-                const double s = sigma(k) * per_unit;
-                pixel_[static_cast<std::size_t>(p)] = {
-                    map.x ? map.x[k] : static_cast<float>(col), map.y ? map.y[k] : static_cast<float>(row),
-                    static_cast<float>(static_cast<double>(map.ordinate[k]) * per_unit), static_cast<float>(s * s)};
-                state_[p] = map.edges && map.edges[k] ? edge_pixel : plain;
+        std::vector<double> sigma(static_cast<std::size_t>(cols_));
+        for (int row = first - 1; row < last - 1; ++row) {
+            Pixel* const pixel = &pixel_[static_cast<std::size_t>(index(row, 0))];
+            if (row < 0 || row >= rows_) {
+                std::fill_n(pixel - 1, stride(), Pixel{});
+                continue;
             }
+            pixel[-1] = pixel[cols_] = {};
+            deviations(map, std::int64_t{row} * cols_, cols_, least, sigma.data());
+            fill_row(map, row, sigma.data());
+        }
     });
+}
+
+RANGEEDGE_WIDE void SurfaceImage::fill_row(const RangeMap& map, int row, const double* __restrict sigma) {
+    const std::ptrdiff_t first = std::ptrdiff_t{row} * cols_;
+    const int n = cols_;
+    const float* const ordinate = map.ordinate + first;
+    Pixel* __restrict const pixel = &pixel_[static_cast<std::size_t>(index(row, 0))];
+    std::uint8_t* __restrict const state = &state_[index(row, 0)];
+    const double per_unit = 1 / unit_;
+    RANGEEDGE_INDEPENDENT
+    for (int k = 0; k < n; ++k) {
+        const bool seen = std::isfinite(ordinate[k]);
+        const double s = sigma[k] * per_unit;
+        const float f = static_cast<float>(static_cast<double>(ordinate[k]) * per_unit);
+        pixel[k] = {static_cast<float>(k), static_cast<float>(row), seen ? f : 0.0f,
+                    seen ? static_cast<float>(s * s) : 0.0f};
+        state[k] = seen ? open_pixel : none;
+    }
+    if (map.x)
+        for (int k = 0; k < n; ++k) pixel[k].x = map.x[first + k], pixel[k].y = map.y[first + k];
+    if (!map.edges) return;
+    const std::uint8_t* const edges = map.edges + first;
+    RANGEEDGE_INDEPENDENT
+    for (int k = 0; k < n; ++k)
+        if (state[k] && edges[k]) state[k] = edge_pixel;
 }
 
 double SurfaceImage::residual(const SurfaceSums& sums, const Surface& s) const {
@@ -110,7 +157,8 @@ RANGEEDGE_WIDE void SurfaceImage::sum_columns(int first, int rows, int n, const 
             f0[k] += wf, f1[k] += wf * v, f2[k] += wf * vv, ff[k] += wf * f;
         }
         RANGEEDGE_INDEPENDENT
-        for (int k = 0; k < n; ++k) sums.closed[k] = static_cast<std::uint8_t>(sums.closed[k] | (state[k] != plain));
+        for (int k = 0; k < n; ++k)
+            sums.closed[k] = static_cast<std::uint8_t>(sums.closed[k] | (state[k] != open_pixel));
     }
 }
 

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "base/array.hpp"
+#include "base/memory.hpp"
 #include "base/parallel.hpp"
 #include "image/noise.hpp"
 #include "regions/surface.hpp"
@@ -39,6 +39,8 @@ constexpr double correlation_max = 8;       // noise over a region, in units of 
 // Pixels are known by their index in a copy with a margin of one pixel, so that each has all its neighbours.
 class SurfaceImage {
 public:
+    enum State : std::uint8_t { none, open_pixel, edge_pixel };  // none: without data
+
     // `lateral` is the standard deviation of a pixel's place, in pixels.
     SurfaceImage(const RangeMap& map, double lateral, Team& team);
 
@@ -49,8 +51,9 @@ public:
     int index(int row, int col) const { return (row + 1) * stride() + col + 1; }
     std::array<int, 4> neighbours() const { return {-stride(), -1, 1, stride()}; }
 
-    bool valid(int p) const { return state_[p] != none; }
-    bool open(int p) const { return state_[p] == plain; }
+    const Array<std::uint8_t>& states() const { return state_; }
+    State state(int p) const { return static_cast<State>(state_[p]); }
+    bool open(int p) const { return state_[p] == open_pixel; }
     bool edge(int p) const { return state_[p] == edge_pixel; }
     // Whether an edge runs between two neighbours, or along them a pixel away; not whether one runs across both.
     bool edge_between(int p, int q) const {
@@ -113,11 +116,11 @@ public:
     void sum_columns(int first, int rows, int n, const double* base, const ColumnSums& sums) const;
 
 private:
-    enum State : std::uint8_t { none, edge_pixel, plain };
     struct Pixel {
         float x, y, ordinate, variance;
     };
 
+    void fill_row(const RangeMap& map, int row, const double* sigma);
     const Pixel& at(int p) const { return pixel_[static_cast<std::size_t>(p)]; }
     double variance(double variance, double slope_x, double slope_y) const {
         return correlation_ * correlation_ * variance + lateral_ * lateral_ * (slope_x * slope_x + slope_y * slope_y);
@@ -128,7 +131,7 @@ private:
     bool projective_, regular_;
     double lateral_, offset_, unit_ = 1, correlation_ = 1, correlation_area_ = 1;
     std::array<double, 6> to_plane_;
-    std::unique_ptr<Pixel[]> pixel_;
+    std::vector<Pixel, LargeAllocator<Pixel>> pixel_;
     Array<std::uint8_t> state_;
 };
 

@@ -21,6 +21,11 @@ public:
     int count() const { return rows_ * cols_; }
     int index(int row, int col) const { return row * cols_ + col; }
     int first_pixel(int t) const { return image_.index(t / cols_ * side_, t % cols_ * side_); }
+    // The tile of a pixel, -1 where the grid has none.
+    int at(int p) const {
+        const int row = (p / image_.stride() - 1) / side_, col = (p % image_.stride() - 1) / side_;
+        return row < rows_ && col < cols_ ? index(row, col) : -1;
+    }
     bool is_open(int t) const { return open_[t]; }
     // The mean ordinate of an open tile, in standard deviations of a pixel.
     double mean(int t) const { return mean_[t]; }
