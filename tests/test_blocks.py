@@ -210,6 +210,52 @@ class TestRuns:
         )
         assert ones == others
 
+    @pytest.mark.parametrize("jobs", [1, 2])
+    def test_masks_and_maps_of_noise(self, zarr, tmp_path, jobs):
+        np.save(tmp_path / "a.npy", terrain())
+        mask = np.ones((260, 330), np.uint8)
+        mask[90:130, :200] = 0
+        noise = np.full((260, 330), 0.02)
+        noise[:, 200:] = 3.0  # where it hides the houses
+        np.save(tmp_path / "noise.npy", noise)
+        options = {**OPTIONS, "mask": mask, "noise": np.load(tmp_path / "noise.npy", mmap_mode="r")}
+        out = tmp_path / "out.zarr"
+        size = {"blockSize": 128, "overlap": 330}  # every block sees all of it, and so nothing may differ
+        items = list(runBlocks(tmp_path / "a.npy", out, jobs=jobs, **size, **options))
+        assert {item.state for item in items} == {"written"}
+        found = zarr.open_group(str(out), mode="r")["edges"][:]
+        edges = detectEdges(terrain(), **{**options, "noise": noise})
+        assert np.count_nonzero(edges[:, :190]) > 200
+        assert np.count_nonzero(edges[:, 210:]) < 0.1 * np.count_nonzero(detectEdges(terrain(), **OPTIONS)[:, 210:])
+        assert np.array_equal(found, edges)
+        again = list(runBlocks(tmp_path / "a.npy", out, **size, **options))
+        assert {item.state for item in again} == {"skipped"}
+        mask[0, 0] = 0
+        assert {item.state for item in runBlocks(tmp_path / "a.npy", out, **size, **options)} == {"written"}
+
+    def test_only_blocks_are_done_again_whose_mask_has_changed(self, zarr, tmp_path):
+        np.save(tmp_path / "a.npy", terrain())
+        mask = np.ones((260, 330), bool)
+        size = {"blockSize": 128, "overlap": 48}
+        list(runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", mask=mask, **size, **OPTIONS))
+        mask[:40, :40] = False
+        items = list(runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", mask=mask, **size, **OPTIONS))
+        assert [item.state for item in items[:9]] == ["written", *["skipped"] * 8]
+        assert not zarr.open_group(str(tmp_path / "out.zarr"), mode="r")["edges"][:38, :38].any()
+
+    def test_the_noise_is_that_of_pixels_that_are_used(self, zarr, tmp_path):
+        heights = terrain()
+        mask = np.zeros((260, 330), np.uint8)
+        mask[:, :200] = 1
+        heights[:, 200:] += np.random.default_rng(1).normal(0, 3, (260, 130)).astype(np.float32)
+        np.save(tmp_path / "a.npy", heights)
+        options = {"heightMap": True, "pixelSize": 0.5, "mask": mask}
+        list(runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", blockSize=128, overlap=48, **options))
+        found = zarr.open_group(str(tmp_path / "out.zarr"), mode="r")["edges"][:]
+        edges = detectEdges(heights, **options)
+        assert np.count_nonzero(edges) > 200
+        assert np.count_nonzero(found != edges) < 0.05 * np.count_nonzero(edges)
+
     def test_noise_is_estimated_once(self, zarr, tmp_path):
         np.save(tmp_path / "a.npy", terrain())
         options = {"heightMap": True, "pixelSize": 0.5}
@@ -225,7 +271,8 @@ class TestRuns:
         ({"task": "lines"}, "`task` must be 'detect' or 'segment'"),
         ({"blockSize": 8}, "`blockSize`"),
         ({"overlap": -1}, "`overlap`"),
-        ({"noise": np.ones((3, 4))}, "`noise` must be a number or a NoiseModel with blocks"),
+        ({"noise": np.ones((3, 4))}, r"`noise` must be an array of shape \(260, 330\)"),
+        ({"mask": np.ones((330, 260), np.uint8)}, r"`mask` must be an array of shape \(260, 330\)"),
         ({"minArea": 9}, "`minArea` is no option of 'detect'"),
     ],
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -46,6 +46,7 @@ def runBlocks(
     client: Any = None,
     force: bool = False,
     resume: bool = False,
+    mask: np.ndarray | None = None,
     **options: Any,
 ) -> Iterator[BatchItem]:
     """Find the edges or regions of an image that is larger than memory.
@@ -70,9 +71,10 @@ def runBlocks(
         In pixels.
     jobs, client, force, resume
         As for `runBatch`: a block is what a frame is there, and the manifests are beside the store.
+    mask : ndarray of shape (H, W), 8-bit or bool, optional
+        Non-zero where pixels are used. A mask and a map of the noise may be such as ``numpy.load(mmap_mode="r")``
+        returns: no more than a block of them is read at a time.
     {options}
-
-    A noise given as a map is refused, and so is `mask`.
 
     Returns
     -------
@@ -113,16 +115,20 @@ def runBlocks(
     force, resume = boolean("force", force), boolean("resume", resume)
     for option in options.keys() - TASKS[task].options.keys():
         raise error(f"`{option}` is no option of {task!r}")
-    parsed(options, ScanLineParams, Selection, Growing)
-    if isinstance(options.get("noise"), np.ndarray):
-        raise fail("noise", "a number or a NoiseModel with blocks", described(options["noise"]))
     extra("zarr", "zarr", "an image in blocks")
     large = open_large(name)
+    maps = {} if mask is None else {"mask": mask}
+    if isinstance(options.get("noise"), np.ndarray) and options["noise"].ndim:
+        maps["noise"] = options.pop("noise")
+    parsed(options, ScanLineParams, Selection, Growing)
+    for what, values in maps.items():
+        if not isinstance(values, np.ndarray) or values.shape != large.shape:
+            raise fail(what, f"an array of shape {large.shape}", described(values))
     first = _manifest(root, _PASSES[task][0])
     if resume and not first.exists():
         raise error(f"there is no {str(first)!r} to resume from")
     grid = Grid(large.shape, size)
-    items = _passes(task, large, grid, root, overlap, options, force, jobs=jobs, client=client)
+    items = _passes(task, large, grid, root, overlap, options, maps, force, jobs=jobs, client=client)
     return items if folder is None else _and_files(items, task, large, grid, root)
 
 
@@ -151,13 +157,15 @@ def _passes(
     root: Path,
     overlap: int,
     options: dict[str, Any],
+    maps: Mapping[str, np.ndarray],
     force: bool,
     **workers: Any,
 ) -> Iterator[BatchItem]:
     """The two steps of a task; the second anew where the first has written anything."""
-    options = {**options, "noise": _noise(image, options)}
+    if "noise" not in maps:
+        options = {**options, "noise": _noise(image, options, maps.get("mask"))}
     told: dict[str, Any] = {"blockSize": grid.size, "overlap": overlap}
-    sources = list(_sources(image, grid, overlap))
+    sources = list(_sources(image, grid, overlap, maps))
     known = {**image.geometry, **({} if image.georeference is None else {"georeference": image.georeference})}
     for step in _PASSES[task]:
         if step == "labels":
@@ -168,26 +176,41 @@ def _passes(
             yield item
 
 
-def _sources(image: LargeImage, grid: Grid, overlap: int) -> Iterator[FrameSource]:
+@dataclass(frozen=True)
+class _Block(FrameSource):
+    """A block with what overlaps it, and the same parts of maps that go with the image."""
+
+    maps: Mapping[str, np.ndarray] = field(default_factory=dict, repr=False)
+
+
+def _sources(image: LargeImage, grid: Grid, overlap: int, maps: Mapping[str, np.ndarray]) -> Iterator[FrameSource]:
     digits = len(str(max(image.shape)))
     for index in range(len(grid)):
         top, left, bottom, right = grid.window(index)
         name = f"{top:0{digits}d}_{left:0{digits}d}"
         part = f"rows {top} to {bottom}, columns {left} to {right}"
-        yield window_source(image, name, grid.window(index, overlap), part)
+        around = grid.window(index, overlap)
+        source = window_source(image, name, around, part)
+        parts = {what: inside(values, around, (0, 0)) for what, values in maps.items()}
+        yield _Block(name, source.path, part, source.load, source.geometry, maps=parts)
 
 
-def _noise(image: LargeImage, options: dict[str, Any]) -> Any:
+def _noise(image: LargeImage, options: dict[str, Any], mask: np.ndarray | None) -> Any:
     """The noise as given, or as patches tell that are spread over the image, with rows and columns of NaN between."""
     if options.get("noise") is not None:
         return options["noise"]
     size = min(_PATCH, *image.shape)
     side = int(np.sqrt(_PATCHES))
     tops, lefts = (np.unique(np.linspace(0, extent - size, side).astype(int)).tolist() for extent in image.shape)
-    rows = []
-    for top in tops:
-        row = [window_source(image, "", (top, left, top + size, left + size), "").read().src for left in lefts]
-        rows.append(np.hstack([np.pad(patch, 1, constant_values=_nothing(patch)) for patch in row]))
+
+    def patch(top: int, left: int) -> np.ndarray:
+        window = (top, left, top + size, left + size)
+        src = window_source(image, "", window, "").read().src
+        if mask is not None:
+            src[inside(mask, window, (0, 0)) == 0] = _nothing(src)
+        return np.pad(src, 1, constant_values=_nothing(src))
+
+    rows = [np.hstack([patch(top, left) for left in lefts]) for top in tops]
     known = {name: value for name, value in {**image.geometry, **options}.items() if name in MEASURED}
     return estimateNoise(np.vstack(rows), **known)
 
@@ -211,18 +234,25 @@ class _BlockJob(Job):
         prepare_arrays(self.out, arrays, fresh)
         open_arrays(self.out).attrs.update(plain(self.map))
 
+    def parameters(self, frame: FrameSource) -> dict[str, Any]:
+        return {**super().parameters(frame), **plain(_maps_of(frame))}
+
     def write(self, index: int, arrays: dict[str, np.ndarray]) -> Outputs:
         return write_region(self.out, arrays, self.grid.window(index), self.grid.place(index))
 
     def image(self, source: FrameSource, around: tuple[int, ...]) -> tuple[np.ndarray, dict[str, Any]]:
         """A block with what overlaps it, and its geometry."""
-        src, geometry = source.read(**self.options)
+        src, geometry = source.read(**self.options, **_maps_of(source))
         if geometry.get("K") is not None:
             camera = ScanLineParams(K=geometry["K"], distCoeffs=geometry.get("distCoeffs"))
             K = np.array(camera.K)
             K[:2, 2] -= around[1], around[0]
             geometry |= {"K": K, "distCoeffs": camera.distCoeffs}
         return src, geometry
+
+
+def _maps_of(source: FrameSource) -> Mapping[str, np.ndarray]:
+    return source.maps if isinstance(source, _Block) else {}
 
 
 class _Edges(_BlockJob):
