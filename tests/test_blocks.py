@@ -1,5 +1,7 @@
 """One image in blocks: what is exact, what is close, and how it goes on."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,8 @@ from rangeedge import (
     error,
     imreadRange,
     imwriteRange,
+    overallStrength,
+    salienceDistanceTransform,
     segmentRegions,
 )
 from rangeedge.app.cli import main
@@ -210,6 +214,32 @@ class TestRuns:
         )
         assert ones == others
 
+    def test_distances_by_salience_are_those_of_the_whole(self, zarr, tmp_path):
+        np.save(tmp_path / "a.npy", terrain())
+        out = tmp_path / "out.zarr"
+        argv = ["batch", str(tmp_path / "a.npy"), "--height-map", "--pixel-size", "0.5", "--noise", "0.02"]
+        argv += ["--blocks", "64", "--overlap", "8", "--out", str(out)]
+        assert main(argv) == 0
+        assert main([*argv, "--jump-cut", "5"]) == 0
+        found = {name: array[:] for name, array in zarr.open_group(str(out), mode="r").arrays()}
+        salience = overallStrength(found["jump"], found["crease"], 5.0)
+        assert np.count_nonzero((salience > 0) & (salience < 100)) > 0
+        assert np.array_equal(found["salience"], salienceDistanceTransform(salience))
+        lines = [json.loads(line) for line in (tmp_path / "out.zarr.salience.manifest.jsonl").read_text().splitlines()]
+        assert [line["counts"] for line in lines] == [{"unsurePixels": 0}] * 30
+
+    def test_distances_by_salience_beyond_reach_are_never_too_small(self, zarr, tmp_path, monkeypatch):
+        monkeypatch.setattr("rangeedge.app.blocks._Saliences.reach", 20)
+        np.save(tmp_path / "a.npy", terrain())
+        out = tmp_path / "out.zarr"
+        list(runBlocks(tmp_path / "a.npy", out, blockSize=64, overlap=8, jumpCut=5.0, **OPTIONS))
+        found = {name: array[:] for name, array in zarr.open_group(str(out), mode="r").arrays()}
+        whole = salienceDistanceTransform(overallStrength(found["jump"], found["crease"], 5.0))
+        lines = [json.loads(line) for line in (tmp_path / "out.zarr.salience.manifest.jsonl").read_text().splitlines()]
+        unsure = sum(line["counts"]["unsurePixels"] for line in lines)
+        assert 0 < np.count_nonzero(found["salience"] != whole) <= unsure
+        assert (found["salience"] >= whole).all()
+
     @pytest.mark.parametrize("jobs", [1, 2])
     def test_masks_and_maps_of_noise(self, zarr, tmp_path, jobs):
         np.save(tmp_path / "a.npy", terrain())
@@ -273,6 +303,8 @@ class TestRuns:
         ({"overlap": -1}, "`overlap`"),
         ({"noise": np.ones((3, 4))}, r"`noise` must be an array of shape \(260, 330\)"),
         ({"mask": np.ones((330, 260), np.uint8)}, r"`mask` must be an array of shape \(260, 330\)"),
+        ({"jumpCut": 0}, "`jumpCut`"),
+        ({"jumpCut": 1.0, "task": "segment"}, "`jumpCut` must be None for 'segment'"),
         ({"minArea": 9}, "`minArea` is no option of 'detect'"),
     ],
 )

@@ -22,6 +22,7 @@ from .understood import warning_in_flags
 
 BATCH_ARGUMENTS = {
     *("inputs", "task", "form", "jobs", "dask", "perTask", "resume", "force", "topics", "blocks", "overlap"),
+    "jumpCut",
 }
 
 _NAMED = 3  # frames of a kind of failure or warning
@@ -63,6 +64,14 @@ def add_batch_arguments(parser: argparse.ArgumentParser) -> None:
         " become GeoTIFFs",
     )
     own.add_argument("--overlap", type=int, default=None, metavar="N", help="pixels around a block (default: 256)")
+    own.add_argument(
+        "--jump-cut",
+        type=float,
+        default=None,
+        metavar="X",
+        dest="jumpCut",
+        help="with --blocks, write distances by salience too; a jump of that length counts in full",
+    )
     own.add_argument(
         "--topic",
         action="append",
@@ -117,7 +126,7 @@ def run_batch(args: argparse.Namespace, options: dict[str, Any], flag: Callable[
 
 def _expect_partners(args: argparse.Namespace) -> None:
     """Refuse what would have no effect."""
-    for name, partner in (("overlap", "blocks"), ("perTask", "dask")):
+    for name, partner in (("overlap", "blocks"), ("jumpCut", "blocks"), ("perTask", "dask")):
         if getattr(args, name) is not None and getattr(args, partner) is None:
             raise error(f"`{name}` goes with `{partner}`, which is not given")
     if args.blocks is not None and args.form is not None:
@@ -130,7 +139,8 @@ def _run(args: argparse.Namespace, options: dict[str, Any], client: Any, words: 
         if len(args.inputs) != 1:
             raise error(f"`blocks` does one INPUT, not {len(args.inputs)}")
         size = {"blockSize": args.blocks} | ({} if args.overlap is None else {"overlap": args.overlap})
-        items, total = runBlocks(args.inputs[0], args.out, args.task, **size, **told), None
+        items = runBlocks(args.inputs[0], args.out, args.task, jumpCut=args.jumpCut, **size, **told)
+        total = None
     else:
         frames = framesOf(args.inputs, topics=args.topics, calibration=options.get("calibration"))
         told |= {} if args.perTask is None else {"batch": args.perTask}

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
-from .._check import boolean, described, error, fail, integer
+from .._check import boolean, described, error, fail, integer, number
 from .._option import parsed, takes
-from ..distance import distanceTransform
+from ..distance import distanceTransform, salienceDistanceTransform
 from ..io import RangeImage
 from ..io.source import file_name
+from ..io.tiff import Window
 from ..noise import estimateNoise
 from ..options import DETECTION, MEASURED, Growing, ScanLineParams, Selection
 from ..recording import FrameSource
@@ -24,11 +25,13 @@ from ..recording.manifest import Manifest, read_lines
 from ..recording.source import extra
 from ..recording.stores import Outputs, open_arrays, packed, prepare_arrays, write_file, write_region
 from ..regions import segmentRegions
+from ..selection import overallStrength
 from .results import plain
 from .run import BatchItem, Job, run_frames
 from .tasks import TASKS, Counts
 
 _REACH = 4096  # pixels around a block in which the nearest edge is looked for
+_SALIENCE_REACH = 1024  # the same where weak edges count for less: distances by salience soon exceed any reach
 _STRIP = 32  # pixels across a seam in which labels of both sides are compared
 _PATCHES = 16  # of the image, of which the noise is estimated
 _PATCH = 512  # pixels
@@ -47,6 +50,7 @@ def runBlocks(
     force: bool = False,
     resume: bool = False,
     mask: np.ndarray | None = None,
+    jumpCut: float | None = None,
     **options: Any,
 ) -> Iterator[BatchItem]:
     """Find the edges or regions of an image that is larger than memory.
@@ -74,6 +78,8 @@ def runBlocks(
     mask : ndarray of shape (H, W), 8-bit or bool, optional
         Non-zero where pixels are used. A mask and a map of the noise may be such as ``numpy.load(mmap_mode="r")``
         returns: no more than a block of them is read at a time.
+    jumpCut : float, optional
+        With it, ``detect`` writes salience too: `salienceDistanceTransform` of `overallStrength` with that cut.
     {options}
 
     Returns
@@ -89,10 +95,11 @@ def runBlocks(
     Notes
     -----
     Distances are those of the whole image wherever they are less than 4096 pixels; of a pixel farther from every edge
-    than that, the distance to the nearest one that was seen, or inf. Scan lines are divided from end to end, and so
-    edges may differ where a block ends them earlier; components of edges and regions are cut off beyond the overlap.
-    Labels of two blocks become one where they share half of the smaller, in the 32 pixels beyond the seam that both
-    blocks have labelled.
+    than that, the distance to the nearest one that was seen, or inf. Salience distances are exact below 1024 pixels,
+    and beyond never too small; ``unsurePixels`` in the manifest counts those that may differ. Scan lines are divided
+    from end to end, and so edges may differ where a block ends them earlier; components of edges and regions are cut
+    off beyond the overlap. Labels of two blocks become one where they share half of the smaller, in the 32 pixels
+    beyond the seam that both blocks have labelled.
 
     Examples
     --------
@@ -117,6 +124,10 @@ def runBlocks(
         raise error(f"`{option}` is no option of {task!r}")
     extra("zarr", "zarr", "an image in blocks")
     large = open_large(name)
+    if jumpCut is not None:
+        jumpCut = number("jumpCut", jumpCut, 0, above=True)
+        if task != "detect":
+            raise fail("jumpCut", f"None for {task!r}", described(jumpCut))
     maps = {} if mask is None else {"mask": mask}
     if isinstance(options.get("noise"), np.ndarray) and options["noise"].ndim:
         maps["noise"] = options.pop("noise")
@@ -128,11 +139,14 @@ def runBlocks(
     if resume and not first.exists():
         raise error(f"there is no {str(first)!r} to resume from")
     grid = Grid(large.shape, size)
-    items = _passes(task, large, grid, root, overlap, options, maps, force, jobs=jobs, client=client)
-    return items if folder is None else _and_files(items, task, large, grid, root)
+    steps = _PASSES[task] if jumpCut is None else (*_PASSES[task], "salience")
+    items = _passes(steps, large, grid, root, overlap, options, maps, jumpCut, force, jobs=jobs, client=client)
+    return items if folder is None else _and_files(items, steps, large, grid, root)
 
 
-def _and_files(items: Iterator[BatchItem], task: str, image: LargeImage, grid: Grid, root: Path) -> Iterator[BatchItem]:
+def _and_files(
+    items: Iterator[BatchItem], steps: Sequence[str], image: LargeImage, grid: Grid, root: Path
+) -> Iterator[BatchItem]:
     """The blocks, and when all are done the arrays as files beside the store."""
     whole = True
     for item in items:
@@ -140,7 +154,7 @@ def _and_files(items: Iterator[BatchItem], task: str, image: LargeImage, grid: G
         yield item
     if whole:
         arrays = open_arrays(root, "r")
-        for name in (name for step in _PASSES[task] for name in _STEPS[step].kinds if name != "parts"):
+        for name in (name for step in steps for name in _STEPS[step].kinds if name != "parts"):
             path = root.with_name(f"{name}.tif")
             write_geotiff(path, arrays[name], image, grid.size)
             yield BatchItem(image.path, str(path), "written", "")
@@ -151,29 +165,31 @@ def _manifest(root: Path, step: str) -> Path:
 
 
 def _passes(
-    task: str,
+    steps: Sequence[str],
     image: LargeImage,
     grid: Grid,
     root: Path,
     overlap: int,
     options: dict[str, Any],
     maps: Mapping[str, np.ndarray],
+    jumpCut: float | None,
     force: bool,
     **workers: Any,
 ) -> Iterator[BatchItem]:
-    """The two steps of a task; the second anew where the first has written anything."""
+    """The steps of a task; those after the first anew where one has written anything."""
     if "noise" not in maps:
         options = {**options, "noise": _noise(image, options, maps.get("mask"))}
     told: dict[str, Any] = {"blockSize": grid.size, "overlap": overlap}
     sources = list(_sources(image, grid, overlap, maps))
     known = {**image.geometry, **({} if image.georeference is None else {"georeference": image.georeference})}
-    for step in _PASSES[task]:
-        if step == "labels":
-            told |= _numbering(root, grid)
-        job, manifest = _STEPS[step](root, options, told, grid, known), Manifest(_manifest(root, step))
-        for item in run_frames(job, sources, manifest, force, **workers):
-            force |= item.state == "written"
+    again = force
+    for step in steps:
+        own = {"jumpCut": jumpCut} if step == "salience" else _numbering(root, grid) if step == "labels" else {}
+        job, manifest = _STEPS[step](root, options, told | own, grid, known), Manifest(_manifest(root, step))
+        for item in run_frames(job, sources, manifest, again, **workers):
+            force |= item.state == "written" and step == steps[0]
             yield item
+        again = force
 
 
 @dataclass(frozen=True)
@@ -269,21 +285,38 @@ class _Edges(_BlockJob):
 
 class _Distances(_BlockJob):
     kinds: ClassVar[Mapping[str, str]] = {"distance": "f4"}
+    reach: ClassVar[int] = _REACH
+
+    def seen(self, arrays: Any, around: Window) -> np.ndarray:
+        """The distances of a window, to edges in that window."""
+        top, left, bottom, right = around
+        return distanceTransform(arrays["edges"][top:bottom, left:right])
 
     def __call__(self, task: tuple[int, FrameSource]) -> tuple[Outputs, Counts]:
         """With as much around the block as it takes to know that no edge beyond is nearer."""
         index, _ = task
-        edges = open_arrays(self.out)["edges"]
+        (name,) = self.kinds
         window, margin = self.grid.window(index), self.told["overlap"]
         while True:
             around = self.grid.window(index, margin)
-            top, left, bottom, right = around
-            distance = inside(distanceTransform(edges[top:bottom, left:right]), window, around)
+            distance = inside(self.seen(open_arrays(self.out), around), window, around)
             unsure = distance > clearance(window, around, self.grid.shape)
-            if not unsure.any() or margin >= _REACH:
-                return self.write(index, {"distance": distance}), {"unsurePixels": int(np.count_nonzero(unsure))}
+            if not unsure.any() or margin >= self.reach:
+                return self.write(index, {name: distance}), {"unsurePixels": int(np.count_nonzero(unsure))}
             farthest = distance[unsure].max()
-            margin = min(_REACH, int(np.ceil(farthest)) if np.isfinite(farthest) else 2 * margin + 64)
+            margin = min(self.reach, int(np.ceil(farthest)) if np.isfinite(farthest) else 2 * margin + 64)
+
+
+class _Saliences(_Distances):
+    """A salience is at most 1, and so no edge is nearer by it than it is."""
+
+    kinds: ClassVar[Mapping[str, str]] = {"salience": "f4"}
+    reach: ClassVar[int] = _SALIENCE_REACH
+
+    def seen(self, arrays: Any, around: Window) -> np.ndarray:
+        top, left, bottom, right = around
+        jump, crease = (arrays[name][top:bottom, left:right] for name in ("jump", "crease"))
+        return salienceDistanceTransform(overallStrength(jump, crease, self.told["jumpCut"]))
 
 
 class _Parts(_BlockJob):
@@ -323,7 +356,13 @@ class _Labels(_BlockJob):
 
 # The steps of a task, the second of which needs the whole of the first.
 _PASSES = {"detect": ("edges", "distance"), "segment": ("parts", "labels")}
-_STEPS: dict[str, type[_BlockJob]] = {"edges": _Edges, "distance": _Distances, "parts": _Parts, "labels": _Labels}
+_STEPS: dict[str, type[_BlockJob]] = {
+    "edges": _Edges,
+    "distance": _Distances,
+    "salience": _Saliences,
+    "parts": _Parts,
+    "labels": _Labels,
+}
 
 
 def _strips(root: Path, index: int) -> str:
