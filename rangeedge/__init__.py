@@ -22,7 +22,7 @@ edges               detectEdges, detectEdgesWithStrength, createScanLineDetector
 why                 explainPixel, drawExplanation
 strengths           edgeStrength, edgePoints, kindNames, splitScanLine, strengthImage, overallStrength
 select and thin     selectEdges, thinEdges, closeContours
-lines in space      linkEdges, fitSegments, writeLines, readLines
+lines in space      linkEdges, fitSegments, fitArcs, writeLines, readLines
 distances           distanceTransform, salienceDistanceTransform, ...WithLabels
 seeds, surfaces     extractSeeds, growRegions, segmentRegions, ...WithStats
 their outlines      regionBoundaries, regionAdjacency, regionCorners
@@ -42,6 +42,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._check import error
 from .adjacency import regionAdjacency, regionCorners
+from .arcs import fitArcs
 from .boundaries import RegionBoundaries, RegionBoundary, regionBoundaries
 from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
@@ -84,6 +85,7 @@ from .distance import (
 )
 from .draw import (
     colorizeDistance,
+    drawArcs,
     drawBoundaries,
     drawChains,
     drawEdges,
@@ -156,6 +158,7 @@ __all__ = [  # noqa: RUF022
     "linkEdges",
     "Segments",
     "fitSegments",
+    "fitArcs",
     "Line",
     "toLines",
     "writeLines",
@@ -180,6 +183,7 @@ __all__ = [  # noqa: RUF022
     "drawEdges",
     "drawChains",
     "drawSegments",
+    "drawArcs",
     "drawRegions",
     "drawBoundaries",
     "colorizeDistance",

@@ -34,6 +34,7 @@ POINT = np.dtype(
         ("crease", "f8"),
         ("significance", "f8"),
         ("measured", "3f8"),
+        ("deviation", "f8"),
     ]
 )
 CHAIN = np.dtype(
@@ -61,8 +62,10 @@ class EdgeChain:
         x, y (pixels, subpixel); point, its coordinates in space, of a jump on the nearer surface, and behind, those on
         the surface behind (NaN of a crease); normals (2, 3), unit vectors toward the viewer of the surface on the left
         and of that on the right of the chain, of a jump the nearer one and that behind, NaN where unknown; jump (length
-        along the viewing axis, 0 of a crease); crease (degrees, 0 of a jump); significance; and measured, where the
-        point would be by the scan lines that cross the edge there alone, without the averaging along the chain.
+        along the viewing axis, 0 of a crease); crease (degrees, 0 of a jump); significance; measured, where the
+        point would be by the scan lines that cross the edge there alone, without the averaging along the chain; and
+        deviation, in pixels across a straight jump, how far the lines are from the middle one that leave the same
+        pixels on its two sides, as a standard deviation, NaN where noise tells more than that, and of others.
     kind : int
         EDGE_JUMP, EDGE_CONVEX or EDGE_CONCAVE; EDGE_BOUNDARY beside pixels without data, with `boundaryEdges`. Along a
         jump the nearer surface is on the left, seen in the image, and along a boundary the data.
@@ -267,7 +270,7 @@ def _points(frame: Frame, rows: np.ndarray, kinds: np.ndarray) -> np.ndarray:
     first, second = points["normals"][:, 0], points["normals"][:, 1]
     apart = np.linalg.norm(first - second, axis=1), np.linalg.norm(first + second, axis=1)
     points["crease"] = np.where(meets, np.degrees(2 * np.arctan2(*apart)), 0)
-    points["significance"] = rows[:, 10]
+    points["significance"], points["deviation"] = rows[:, 10], rows[:, 14]
     return points
 
 

@@ -31,7 +31,7 @@ _USUAL_LENGTH = 10  # of a line, as core/edges/select.cpp has it
 _EVERYTHING: dict[str, Any] = {"minLength": 1, "lineSignificance": 0.0, "dynamic": False}
 _RAISED, _LOWERED = 1.001, 0.999  # past a limit, beyond the rounding of the maps
 _NAN = float("nan")
-_COMPANY = 4  # creases of the nine pixels around one that stays, as selection.py has it
+_COMPANY = 4  # creases of the nine pixels around one that stays, as core/edges/select.cpp has it
 _TESTS = ("gap", "single", "smooth", "smeared", "significance")  # in the order in which cuts get to them
 
 

@@ -106,10 +106,9 @@ def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
     coarse = src[::4, ::4][frame.valid[::4, ::4] > 0]
     if src.size < _LEAST_IMAGE or not len(coarse):
         return
-    valid = frame.valid > 0
-    for bound in (np.max, np.min):
+    for bound in (np.fmin, np.fmax):  # of ordinates, which are NaN where invalid, and grow or fall with the values
         _core.checkpoint()
-        value = bound(src, where=valid, initial=coarse[0])  # without a copy of the image
+        value = src.flat[np.argmax(frame.ordinate == bound.reduce(frame.ordinate, axis=None))]
         others = coarse[coarse != value].astype(np.float64)
         if not len(others):
             continue

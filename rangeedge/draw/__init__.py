@@ -4,12 +4,13 @@ from .boundaries import drawBoundaries
 from .distance import colorizeDistance
 from .edges import drawEdges
 from .explanation import drawExplanation
-from .lines import drawChains, drawSegments
+from .lines import drawArcs, drawChains, drawSegments
 from .overview import drawOverview, drawPanels, region_overview
 from .regions import drawRegions
 
 __all__ = [
     "colorizeDistance",
+    "drawArcs",
     "drawBoundaries",
     "drawChains",
     "drawEdges",

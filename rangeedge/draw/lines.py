@@ -1,4 +1,4 @@
-"""Pictures of chains and of segments, in the colours of `drawEdges`."""
+"""Pictures of chains, of segments and of arcs, in the colours of `drawEdges`."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import numpy as np
 
 from .._check import deliver, described, fail, integer
 from .._option import takes
+from ..arcs import ARC, arc_points
 from ..chains import EdgeChain, EdgeChains
 from ..options import GEOMETRY
+from ..projection import project
 from ..segments import SEGMENT, VERTEX
 from .palette import kind_colour
 from .relief import backdrop
@@ -138,6 +140,66 @@ def drawSegments(
         _dot(canvas, np.array([vertex["x"], vertex["y"]]), _VERTEX, scale)
     for segment in segments if lengths else ():
         _label(canvas, segment["pixels"].mean(axis=0), f"{segment['length']:.4g}", scale)
+    return deliver("dst", canvas, dst)
+
+
+@takes(GEOMETRY)
+def drawArcs(
+    src: np.ndarray,
+    arcs: np.ndarray,
+    dst: np.ndarray | None = None,
+    *,
+    scale: int = 1,
+    radii: bool = False,
+    **geometry: Unpack[GeometryOptions],
+) -> np.ndarray:
+    """Draw arcs and circles in space over the relief of a range image, or over a picture.
+
+    drawArcs(src, arcs[, dst], *[, scale[, radii[, K[, ...]]]]) -> dst
+
+    Colours are those of `drawChains`; centres are white dots. Where an arc lies in the image follows from the geometry,
+    as `project` says.
+
+    Parameters
+    ----------
+    src, dst, scale
+        As in `drawChains`.
+    {options}
+    arcs : structured ndarray
+        From `fitArcs`.
+    radii : bool
+        Whether to write the radius of each arc beside its centre.
+
+    Returns
+    -------
+    dst : ndarray of shape (scale H, scale W, 3), CV_8U
+
+    Raises
+    ------
+    rangeedge.error
+        On a bad argument.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from rangeedge import drawArcs, fitArcs, linkEdges
+    >>> y, x = np.mgrid[:80, :80]
+    >>> hole = np.where(np.hypot(x - 40.2, y - 38.7) < 25, 5.0, 1.0)
+    >>> drawArcs(hole, fitArcs(linkEdges(hole, pixelSize=1, noise=0.001)), pixelSize=1).shape
+    (80, 80, 3)
+    """
+    if not isinstance(arcs, np.ndarray) or arcs.dtype != ARC:
+        raise fail("arcs", "a structured array from fitArcs", described(arcs))
+    canvas, scale = canvas_of(src, scale, geometry)
+    for arc in arcs:
+        places = project(arc_points(arc), **geometry)[:, :2]
+        center = project(arc["center"], **geometry)[:2]
+        if np.isfinite(places).all():
+            _line(canvas, places, int(arc["kind"]), scale, closed=bool(arc["angle"] >= 360))
+        if np.isfinite(center).all():
+            _dot(canvas, center, _VERTEX, scale)
+            if radii:
+                _label(canvas, center, f"r {arc['radius']:.4g}", scale)
     return deliver("dst", canvas, dst)
 
 

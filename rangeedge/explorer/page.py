@@ -35,9 +35,9 @@ _CAPTIONS = {
 }
 _GEOMETRY = {
     "K": "camera: fx, fy, cx, cy [pixels]",
-    "pixelSize": "or pixel size of a grid",
-    "depthFactor": "integers a unit of length (1000)",
-    "invalid": "values that are no data",
+    "pixelSize": "or pixel size",
+    "depthFactor": "depth factor",
+    "invalid": "no data",
 }
 _GROUPS = {"Which edges count": SELECTION, "How scan lines are cut": DETECTION.keys() - SELECTION.keys()}
 _LARGEST_UPLOAD = 200_000_000  # bytes
@@ -137,9 +137,11 @@ class _Page:
             label="drop a range image here", auto_upload=True, max_file_size=_LARGEST_UPLOAD, on_upload=self._uploaded,
             on_rejected=lambda: self._complain("the file is larger than 200 MB"),
         ).props("flat bordered").classes("w-full")  # fmt: skip
-        self.geometry = {name: ui.input(label).props(f"dense id={name}") for name, label in _GEOMETRY.items()}
-        for field in self.geometry.values():
-            field.classes("w-full")
+        self.geometry = {}
+        with ui.element("div").classes("w-full grid grid-cols-3 gap-2"):
+            for name, label in _GEOMETRY.items():
+                field = ui.input(label).props(f"dense id={name}").classes("col-span-3" if name == "K" else "")
+                self.geometry[name] = field.tooltip(_explained(name))
         with ui.row().classes("w-full items-center justify-between"):
             self.height = ui.checkbox("larger is nearer").props("dense")
             ui.button("apply", on_click=self._placed).props("dense flat no-caps id=apply")
@@ -213,7 +215,7 @@ class _Page:
                 self.program.content = self.session.python()
                 await run.io_bound(lambda r=results: r.edges)
                 await asyncio.gather(*(self._show(results, views, group) for group in SHARING))
-                if not self.cancellation.cancelled:
+                if not self.cancellation.cancelled and not self.status.is_deleted:
                     took, edges = 1000 * (time.perf_counter() - start), np.count_nonzero(results.edges)
                     self.status.text = f"{width} x {height}, {edges} edge pixels, {len(views)} views in {took:.0f} ms"
         except error as problem:
@@ -225,7 +227,7 @@ class _Page:
         """Those of a group of views that are shown, each as soon as it is drawn."""
         for name in (name for name in group if name in views):
             picture = await run.io_bound(self._picture, name, results)
-            if picture is None:
+            if picture is None or views[name].is_deleted:  # other views were chosen, or the page was closed
                 return
             views[name].set_source(picture)
             if self.pending:
