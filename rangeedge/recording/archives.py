@@ -12,7 +12,7 @@ from ..io.arrays import read_header, read_npy, source_of
 from ..io.source import expect_size, opened
 from .source import kept
 
-_AT_A_TIME = 2**24  # bytes
+_AT_A_TIME = 2**22  # bytes
 
 
 class NpzStack:

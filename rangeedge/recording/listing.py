@@ -79,6 +79,8 @@ def framesOf(
         for given in inputs
         for frame in ([given] if isinstance(given, FrameSource) else _listed(given, tuple(topics), options))
     ]
+    if topics and not any(is_bag(Path(frame.path)) for frame in frames):
+        raise error(f"`topics` = {', '.join(topics)}, but no input is a bag or MCAP file")
     return _named_apart(frames)
 
 
