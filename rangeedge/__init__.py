@@ -22,14 +22,17 @@ edges               detectEdges, detectEdgesWithStrength, createScanLineDetector
 why                 explainPixel, drawExplanation
 strengths           edgeStrength, edgePoints, kindNames, splitScanLine, strengthImage, overallStrength
 select and thin     selectEdges, thinEdges, closeContours
-lines in space      linkEdges, fitSegments, writeLines
+lines in space      linkEdges, fitSegments, fitArcs, writeLines, readLines
 distances           distanceTransform, salienceDistanceTransform, ...WithLabels
-seeds, surfaces     extractSeeds, growRegions, segmentRegions, ...WithStats, regionAdjacency
-pictures (BGR)      drawEdges, drawRegions, drawChains, drawSegments, colorizeDistance, drawOverview, drawPanels
+seeds, surfaces     extractSeeds, growRegions, segmentRegions, ...WithStats
+their outlines      regionBoundaries, regionAdjacency, regionCorners
+pictures (BGR)      drawEdges, drawRegions, drawBoundaries, drawChains, drawSegments, colorizeDistance, drawOverview
+parameters          ScanLineDetector.save and .load, the same files as `--params` of the shell and the explorer
+give up a call      Cancellation, Ctrl-C
 more                rangeedge.synthetic, rangeedge.evaluation, rangeedge.optimality, rangeedge.batch
 
 `help(rangeedge.detectEdges)` has every option. From a shell: `rangeedge --help`; sliders: `rangeedge explore`.
-Every bad argument raises `rangeedge.error`, which is a `cv2.error` and a `ValueError`.
+Every bad value raises `rangeedge.error`, which is a `cv2.error` and a `ValueError`.
 """
 
 from __future__ import annotations
@@ -39,6 +42,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._check import error
 from .adjacency import regionAdjacency, regionCorners
+from .arcs import fitArcs
 from .boundaries import RegionBoundaries, RegionBoundary, regionBoundaries
 from .cancellation import Cancellation
 from .chains import EdgeChain, EdgeChains, linkEdges
@@ -81,6 +85,7 @@ from .distance import (
 )
 from .draw import (
     colorizeDistance,
+    drawArcs,
     drawBoundaries,
     drawChains,
     drawEdges,
@@ -153,6 +158,7 @@ __all__ = [  # noqa: RUF022
     "linkEdges",
     "Segments",
     "fitSegments",
+    "fitArcs",
     "Line",
     "toLines",
     "writeLines",
@@ -177,6 +183,7 @@ __all__ = [  # noqa: RUF022
     "drawEdges",
     "drawChains",
     "drawSegments",
+    "drawArcs",
     "drawRegions",
     "drawBoundaries",
     "colorizeDistance",

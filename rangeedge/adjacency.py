@@ -14,7 +14,7 @@ from .frame import Frame
 from .noise import measured_frame
 from .options import MEASURED, ScanLineParams
 from .projection import to_pixels
-from .surfaces import surfaces_of
+from .surfaces import surfaces_of, without_rims
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -57,9 +57,11 @@ def regionAdjacency(
 
     Two pixels of a row or column that belong to different regions, with at most `gap` pixels of none between them, are
     a contact. There the surfaces meet, or one of them is nearer, by their planes: those fitted to the regions, or those
-    that touch a curved surface at the pixel. They meet where the nearer one changes between the pixels, or one beyond,
-    or the depths differ by less than three standard deviations of the noise. A box on a table does both: such a pair
-    is there twice, once with the contacts at which the surfaces meet, once with those of the jump.
+    that touch a curved surface at the pixel. Pixels within three of the border of a region count for its surface only
+    if three quarters of it are such: sensors round edges off. Surfaces meet where the nearer one changes between the
+    pixels, or one beyond, or the depths differ by less than three standard deviations of the noise. A box on a table
+    does both: such a pair is there twice, once with the contacts at which the surfaces meet, once with those of the
+    jump.
 
     Parameters
     ----------
@@ -208,7 +210,7 @@ def _neighbours(
     i, j = _contacts(labels, gap, frame.seam)
     if not len(i):
         return [], np.zeros(0)
-    surfaces = surfaces_of(frame, labels, int(labels.max()) + 1)
+    surfaces = surfaces_of(frame, without_rims(labels), int(labels.max()) + 1)
     flat = labels.ravel()
     code = flat[i].astype(np.int64) * len(surfaces) + flat[j]
     order = np.argsort(code, kind="stable")

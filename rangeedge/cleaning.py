@@ -172,6 +172,8 @@ def _narrow(missing: np.ndarray, most: int) -> np.ndarray:
     around = np.pad(missing, most, constant_values=True)
     reach = most / 2 + 0.5  # from centres of pixels to those of pixels with data
     middles = _distance(around) > reach
+    if not middles.any():
+        return missing.view(np.uint8)
     return (missing & (_distance(~middles) > reach)[most:-most, most:-most]).view(np.uint8)
 
 

@@ -282,8 +282,8 @@ def edgePoints(
 
 def measure_strength(frame: Frame, params: ScanLineParams) -> EdgeStrength:
     """Edge strengths of a checked range image."""
-    strength = no_strength(frame.shape)
     parts = sectors_of(frame)
+    strength = _maps(np.zeros if parts else np.empty, frame.shape)
     for part in parts:
         for whole, own in zip(strength, measure_strength(part.frame, params), strict=True):
             part.put(whole, own)
@@ -302,8 +302,8 @@ def measure_points(frame: Frame, params: ScanLineParams) -> np.ndarray:
 
 def measure_both(frame: Frame, params: ScanLineParams) -> tuple[EdgeStrength, np.ndarray]:
     """Edge strengths and edge points of a checked range image, of one approximation of its scan lines."""
-    strength = no_strength(frame.shape)
     parts = sectors_of(frame)
+    strength = _maps(np.zeros if parts else np.empty, frame.shape)
     if parts:
         points = []
         for part in parts:
@@ -330,9 +330,14 @@ def _points(candidates: dict[str, np.ndarray]) -> np.ndarray:
 
 
 def no_strength(shape: tuple[int, int]) -> EdgeStrength:
-    """All zero. Three maps of floats and one of bytes share an allocation: new memory takes the system a while."""
+    """All zero."""
+    return _maps(np.zeros, shape)
+
+
+def _maps(allocate: Callable[..., np.ndarray], shape: tuple[int, int]) -> EdgeStrength:
+    """Three maps of floats and one of bytes share an allocation: new memory takes the system a while."""
     size = shape[0] * shape[1]
-    maps = np.zeros(13 * size, np.uint8)
+    maps = allocate(13 * size, np.uint8)
     floats = maps[: 12 * size].view(np.float32).reshape(3, *shape)
     return EdgeStrength(floats[0], floats[1], maps[12 * size :].reshape(shape), floats[2])
 

@@ -31,7 +31,7 @@ _USUAL_LENGTH = 10  # of a line, as core/edges/select.cpp has it
 _EVERYTHING: dict[str, Any] = {"minLength": 1, "lineSignificance": 0.0, "dynamic": False}
 _RAISED, _LOWERED = 1.001, 0.999  # past a limit, beyond the rounding of the maps
 _NAN = float("nan")
-_COMPANY = 4  # creases of the nine pixels around one that stays, as selection.py has it
+_COMPANY = 4  # creases of the nine pixels around one that stays, as core/edges/select.cpp has it
 _TESTS = ("gap", "single", "smooth", "smeared", "significance")  # in the order in which cuts get to them
 
 
@@ -303,7 +303,10 @@ class _Case:
         return {}
 
     def _nearest(self, reach: int) -> Iterator[Neighbour]:
-        """The nearest edge, and the nearest candidate where that is nearer; the farther side of a jump is none."""
+        """The nearest edge, and the nearest candidate where that is nearer.
+
+        None of these is the farther side of a jump, nor what touches an edge, whose line that is part of.
+        """
         top, left = max(self.y - reach, 0), max(self.x - reach, 0)
         part = np.s_[top : self.y + reach + 1, left : self.x + reach + 1]
         jump, crease, kind, _ = (values[part] for values in self.strength)
@@ -312,7 +315,8 @@ class _Case:
         distance[(distance == 0) | (distance > reach)] = np.inf
         edge, bits = self.thin[part] > 0, np.uint8(EDGE_OCCLUDING | EDGE_CONVEX | EDGE_CONCAVE)
         farthest = np.inf
-        for marked in (edge, kind & bits > 0):
+        lines = cv2.dilate(self.thin, np.ones((3, 3), np.uint8))[part] > 0
+        for marked in (edge, (kind & bits > 0) & ~lines):
             place = np.unravel_index(np.argmin(np.where(marked, distance, np.inf)), kind.shape)
             if marked[place] and distance[place] < farthest:
                 farthest = float(distance[place])

@@ -58,7 +58,7 @@ def mapFrames(
         Processes of this machine, without `client`; 1 is this process itself. A program that calls with more than 1
         does so under ``if __name__ == "__main__":``, as for `concurrent.futures.ProcessPoolExecutor`.
     batch : int
-        Frames that make one task of Dask's, which costs about a millisecond.
+        Frames that make one task of Dask's, which costs its scheduler some milliseconds.
 
     Returns
     -------

@@ -400,7 +400,7 @@ class Selection(Options):
         "bool",
         "Whether to remove lines that do not stand out of the noise, by the statistics of all of them (Venkatesh and"
         " Rosin).",
-        flagged="remove lines that do not stand out of the noise, by the statistics of all of them",
+        flagged="remove lines that do not stand out of the statistics of all; it needs these: --min-significance 0",
     )
     boundaryEdges: bool = option(
         False,
@@ -484,7 +484,7 @@ class Closing(Options):
         unit="standard deviations",
     )
     share: float = option(
-        0.9,
+        0.5,
         _real(0, 1, above=True),
         "float",
         "Share of the pixels of a surface that must lie within `tolerance`, in (0, 1].",

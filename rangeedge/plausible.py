@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -41,8 +44,26 @@ class RangeEdgeWarning(UserWarning):
     """What plainly does not fit the range image: a unit, a threshold, a geometry that is missing."""
 
 
+_collected: ContextVar[list[str] | None] = ContextVar("collected", default=None)
+
+
+@contextmanager
+def collected() -> Iterator[list[str]]:
+    """What this thread is warned of, in the place of warnings."""
+    texts: list[str] = []
+    token = _collected.set(texts)
+    try:
+        yield texts
+    finally:
+        _collected.reset(token)
+
+
 def warn(text: str) -> None:
     """Warn whoever called the package."""
+    texts = _collected.get()
+    if texts is not None:
+        texts.append(text)
+        return
     level, frame = 1, sys._getframe()
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_PACKAGE):
         level, frame = level + 1, frame.f_back
@@ -85,10 +106,9 @@ def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
     coarse = src[::4, ::4][frame.valid[::4, ::4] > 0]
     if src.size < _LEAST_IMAGE or not len(coarse):
         return
-    valid = frame.valid > 0
-    for bound in (np.max, np.min):
+    for bound in (np.fmin, np.fmax):  # of ordinates, which are NaN where invalid, and grow or fall with the values
         _core.checkpoint()
-        value = bound(src, where=valid, initial=coarse[0])  # without a copy of the image
+        value = src.flat[np.argmax(frame.ordinate == bound.reduce(frame.ordinate, axis=None))]
         others = coarse[coarse != value].astype(np.float64)
         if not len(others):
             continue

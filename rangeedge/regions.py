@@ -47,7 +47,8 @@ def growRegions(
        They are fitted anew while they grow. A quadratic that has turned around a crease is cut in two.
     3. *Merging*: patches that one surface describes as well as their own join; so do patches that meet along most of
        their border under less than `smoothAngle`, or three times that where one of them is curved. What is small beside
-       its neighbour joins one, and never links two, unless it lies between them like the bend of a strip.
+       its neighbour joins one, and never links two, unless it lies between them like the bend of a strip. Strips of
+       few pixels across that meet end to end, with no edge between, are one.
     4. *Borders*: edge pixels, and others that are left, go to the neighbouring surface they fit best, up to twice the
        tolerance. Strips along rounded edges and regions below `minArea` fall to their neighbours.
 

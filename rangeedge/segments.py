@@ -96,7 +96,8 @@ def fitSegments(
 
     Notes
     -----
-    Deviations count neighbouring points as less than independent, by the correlation of their offsets.
+    Deviations count neighbouring points as less than independent, by the correlation of their offsets. Of a jump that
+    pixels on both sides bound they are those of the lines that leave the same pixels there, and of its noisy depth.
 
     Examples
     --------
@@ -170,10 +171,16 @@ def _segment(chain: EdgeChain, points: np.ndarray, number: int) -> tuple:
     measured = points["measured"] - centre
     across = measured - np.outer(measured @ direction, direction)
     across = across[np.isfinite(across).all(axis=1)]
-    rms, independent = _scatter(across)
-    centre_deviation = rms / np.sqrt(independent)
-    share = _COMMON_OF_JUMPS if chain.kind == EDGE_JUMP else _COMMON_OF_CREASES
-    common = np.hypot(share * rms, _FINEST * length)
+    rms = scatter(across)[0]
+    share = common_share(chain.kind)
+    aside = 0.0
+    normal = _unit(points["normals"][:, 0].mean(axis=0))  # of the nearer surface
+    if np.isfinite(normal).all() and (points["deviation"] > 0).all():  # where it runs pixels tell, of its depth noise
+        across, share = across @ normal[:, None], _COMMON_OF_CREASES
+        aside = _length_aside(points, normal, pixels, direction, length) * _rms(points["deviation"][[0, -1]])
+    noise, independent = scatter(across)
+    centre_deviation = noise / np.sqrt(independent)
+    common = np.hypot(np.hypot(share * noise, _FINEST * length), aside)
     slope_deviation = np.hypot(np.sqrt(12) * centre_deviation, common) / length if length > 0 else np.pi
     solid = {EDGE_CONVEX: 180 - chain.crease, EDGE_CONCAVE: 180 + chain.crease}.get(chain.kind, np.nan)
     return (
@@ -193,7 +200,32 @@ def _segment(chain: EdgeChain, points: np.ndarray, number: int) -> tuple:
     )
 
 
-def _scatter(across: np.ndarray) -> tuple[float, float]:
+def _length_aside(
+    points: np.ndarray, normal: np.ndarray, pixels: list[list[float]], direction: np.ndarray, length: float
+) -> float:
+    """How far a point of a jump moves on the nearer surface when it moves a pixel aside in the image."""
+    middle = points[len(points) // 2]
+    sight = _unit(middle["behind"] - middle["point"])
+    way = np.subtract(pixels[1], pixels[0])
+    aside = _unit(np.cross(direction, sight))
+    per_pixel = length * float(np.linalg.norm(np.cross(direction, sight))) / max(float(np.hypot(*way)), 1e-12)
+    return per_pixel * float(np.hypot(1, normal @ aside / min(normal @ sight, -1e-3)))
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / max(float(np.linalg.norm(vector)), 1e-300)
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def common_share(kind: int) -> float:
+    """The share of their scatter that all points of a chain have in common."""
+    return _COMMON_OF_JUMPS if kind == EDGE_JUMP else _COMMON_OF_CREASES
+
+
+def scatter(across: np.ndarray) -> tuple[float, float]:
     """Root mean square of offsets without those that lie far off, and as how many independent ones they count."""
     if len(across) < 3:
         return 0.0, 1.0

@@ -11,11 +11,12 @@ import numpy as np
 from . import _check, _core
 from ._check import public
 from ._option import takes
-from .constants import EDGE_BOUNDARY, EDGE_OCCLUDING
+from .constants import EDGE_BOUNDARY
 from .dynamic import outstanding
 from .edges import EdgeStrength
+from .frame import threads_worth
 from .options import LINE_SIGNIFICANCE, SELECTION, Selection
-from .pixels import beside, components, pixels_of
+from .pixels import components, pixels_of
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -270,7 +271,8 @@ def _of_maps(
     crease = _check.strength32f("crease", crease, jump.shape)
     jumpThreshold = _check.threshold("jumpThreshold", jumpThreshold)
     selection = Selection(jumpThreshold=jumpThreshold, creaseThreshold=creaseThreshold, **{"minLength": 1, **options})
-    return _check.deliver("dst", select_maps(jump, crease, selection, wrap=_check.boolean("wrap", wrap)), dst)
+    edges = select_maps(jump, crease, None, None, selection, wrap=_check.boolean("wrap", wrap))
+    return _check.deliver("dst", edges, dst)
 
 
 selectEdges.__signature__ = inspect.signature(_of_strength)  # type: ignore[attr-defined]
@@ -278,11 +280,7 @@ selectEdges.__signature__ = inspect.signature(_of_strength)  # type: ignore[attr
 
 def select_strength(strength: EdgeStrength, selection: Selection, wrap: bool = False) -> np.ndarray:
     """The edge map before thinning: jumps on their nearer side, creases that do not stand alone, borders if wanted."""
-    jump = cv2.copyTo(strength.jump, strength.kind & np.uint8(EDGE_OCCLUDING))
-    _core.checkpoint()
-    crease = _unfrayed(strength.crease, selection.hysteresis * selection.creaseThreshold, wrap)
-    _core.checkpoint()
-    edges = select_maps(jump, crease, selection, strength.significance, wrap=wrap)
+    edges = select_maps(*strength, selection, wrap=wrap)
     if selection.boundaryEdges:
         edges[(strength.kind & EDGE_BOUNDARY) > 0] = 255
     return edges
@@ -291,37 +289,33 @@ def select_strength(strength: EdgeStrength, selection: Selection, wrap: bool = F
 def select_maps(
     jump: np.ndarray,
     crease: np.ndarray,
+    kind: np.ndarray | None,
+    significance: np.ndarray | None,
     selection: Selection,
-    significance: np.ndarray | None = None,
     *,
     wrap: bool = False,
 ) -> np.ndarray:
-    """The edge map, 0 and 255, of checked strengths."""
+    """The edge map, 0 and 255, of checked strengths; without `kind` every jump and every crease counts by itself."""
     thresholds, hysteresis = (selection.jumpThreshold or 0.0, selection.creaseThreshold), selection.hysteresis
-    edges = _reaching(jump, crease, thresholds)
+    low = (hysteresis * thresholds[0], hysteresis * thresholds[1])
+
+    def reaching(jump_least: float, crease_least: float) -> np.ndarray:
+        edges = np.empty(jump.shape, bool)
+        least, threads = (jump_least, crease_least, low[1]), threads_worth(jump.size)
+        _core.select_pixels(jump, crease, kind, least, wrap, threads, edges.view(np.uint8))
+        return edges
+
+    edges = reaching(*thresholds)
     _core.checkpoint()
     if hysteresis < 1:
-        low = (hysteresis * thresholds[0], hysteresis * thresholds[1])
-        edges = _connected_to(edges, _reaching(jump, crease, low), wrap)
+        edges = _connected_to(edges, reaching(*low), wrap)
     least = LINE_SIGNIFICANCE if selection.lineSignificance is None else selection.lineSignificance
     if selection.minLength > 1 or (significance is not None and least > 0):
         edges = _lines(edges, selection.minLength, significance, least, wrap)
     if selection.dynamic:
-        edges &= outstanding(jump, wrap) | outstanding(crease, wrap)
+        of_jumps, of_creases = reaching(0.0, np.inf), reaching(np.inf, 0.0)
+        edges &= outstanding(jump * of_jumps, wrap) | outstanding(crease * of_creases, wrap)
     return edges.view(np.uint8) * np.uint8(255)
-
-
-def _unfrayed(crease: np.ndarray, least: float, wrap: bool) -> np.ndarray:
-    """Creases without stray pixels: of the nine around one that stays, four reach `least`.
-
-    In an image of one or two rows or columns lines cannot have so many neighbours: all its creases stay.
-    """
-    if min(crease.shape) < 3:
-        return crease
-    strong = beside(_at_least(crease, least).view(np.uint8), wrap)
-    _core.checkpoint()
-    around = cv2.boxFilter(strong, -1, (3, 3), normalize=False, borderType=cv2.BORDER_CONSTANT)[1:-1, 1:-1]
-    return cv2.copyTo(crease, (around >= 4).view(np.uint8))
 
 
 def _grey_levels(strength: np.ndarray, cut: float) -> np.ndarray:
@@ -330,19 +324,6 @@ def _grey_levels(strength: np.ndarray, cut: float) -> np.ndarray:
     edge = strength > 0
     levels[edge] = np.minimum(np.ceil(255 * strength[edge].astype(np.float64) / cut), 255)
     return levels
-
-
-def _reaching(jump: np.ndarray, crease: np.ndarray, thresholds: tuple[float, float]) -> np.ndarray:
-    """Where a positive strength reaches its threshold, as bool."""
-    return _at_least(jump, thresholds[0]) | _at_least(crease, thresholds[1])
-
-
-def _at_least(strength: np.ndarray, threshold: float) -> np.ndarray:
-    """Where a positive strength reaches a threshold, which may be 0 or more than a float32 holds."""
-    if threshold > float(np.finfo(np.float32).max):
-        return np.zeros(strength.shape, bool)
-    threshold = np.float32(threshold)
-    return strength >= threshold if threshold > 0 else strength > 0
 
 
 def _connected_to(strong: np.ndarray, candidates: np.ndarray, wrap: bool) -> np.ndarray:

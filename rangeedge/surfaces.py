@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from itertools import pairwise
 
+import cv2
 import numpy as np
 
 from . import _core
@@ -14,6 +15,8 @@ SURFACE = np.dtype([("curved", np.bool_), ("centroid", "3f8"), ("normal", "3f8")
 _CURVED_GAIN = 0.8  # a quadratic must lower the rms of a plane to this share
 _LEAST_RELIEF = 1e-6  # of the rms of a plane, in inverse distances
 _LEAST_CURVED = 40  # pixels; fewer tell no curvature
+_RIM = 3  # pixels beside the border of a region over which sensors round edges off
+_LEAST_INNER = 0.25  # of the pixels of a region, without its rim, to do without that
 _LEAST_GRADIENT = 0.01  # of a quadric, of its typical one, where a distance is F / |grad F|
 # Exponents of x, y, z: those of the moments that the core adds up, and those of a quadric's terms.
 _EXPONENTS = [(i, j, n - i - j) for n in range(5) for i in range(n, -1, -1) for j in range(n - i, -1, -1)]
@@ -118,6 +121,19 @@ def surfaces_of(frame: Frame, labels: np.ndarray, count: int) -> np.ndarray:
         ):
             surfaces[name][1:] = values[1:]
     return surfaces
+
+
+def without_rims(labels: np.ndarray) -> np.ndarray:
+    """Labels >= 0 without those of pixels at the rim of their region, of regions that keep enough of their pixels.
+
+    An edge is rounded off by what a sensor averages over. Planes fitted to that, too, meet at flatter angles.
+    """
+    names = np.where(labels > 0, labels, -1).astype(np.float32)
+    window = np.ones((2 * _RIM + 1,) * 2, np.uint8)
+    inner = np.where(cv2.erode(names, window) == cv2.dilate(names, window), labels, 0)
+    before, after = np.bincount(labels.ravel()), np.bincount(inner.ravel(), minlength=int(labels.max()) + 1)
+    whole = after < np.maximum(_LEAST_CURVED, _LEAST_INNER * before)
+    return np.where(whole[labels], labels, inner).astype(labels.dtype, copy=False)
 
 
 def _planes(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

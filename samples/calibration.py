@@ -85,6 +85,7 @@ def figure(curves, normal):
         axes.fill_between(THRESHOLDS, normal / 2, normal * 2, color="0.9", label="normal, within a factor of 2")
         for (own, n, what), share in curves.items():
             if own == kind:
+                share = np.where(np.array(share) > 0, share, np.nan)  # a line ends where nothing was beyond
                 axes.plot(THRESHOLDS, share, "-" if what == "slope" else "--", label=f"{what}, n = {n}")
         axes.set(title=kind, xlabel="k", ylabel="share beyond k", yscale="log", ylim=(1e-7, 1))
     axes.legend(fontsize="x-small", loc="lower left")

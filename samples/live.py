@@ -9,7 +9,8 @@ Edges and regions of a stream of frames, as they come: a camera, a recording, or
 
 RECORDING is anything that `rangeedge batch` takes: a folder of images, a stack, a TUM RGB-D sequence, a ROS bag. A
 window (--show, ends with a key) needs opencv-python in the place of opencv-python-headless; without, the last picture
-is written. The detector is an object that keeps its parameters from frame to frame.
+is written when the stream ends, of a camera by Ctrl-C. The detector is an object that keeps its parameters from frame
+to frame.
 """
 
 import argparse
@@ -44,15 +45,23 @@ def frames(args):
 def openni(geometry):
     """Depth maps in millimetres of a camera that OpenCV reaches by OpenNI 2."""
     camera = cv2.VideoCapture(cv2.CAP_OPENNI2)
-    while camera.grab():
-        found, depth = camera.retrieve(flag=cv2.CAP_OPENNI_DEPTH_MAP)
-        if found:
-            yield rangeedge.RangeImage(depth, geometry)
+    if not camera.isOpened():
+        raise SystemExit("no camera: is it plugged in, and was this OpenCV built with OpenNI 2?")
+    try:
+        while camera.grab():
+            found, depth = camera.retrieve(flag=cv2.CAP_OPENNI_DEPTH_MAP)
+            if found:
+                yield rangeedge.RangeImage(depth, geometry)
+    finally:
+        camera.release()
 
 
 def realsense():
-    """Depth maps of a RealSense camera with its own calibration; needs pyrealsense2."""
-    import pyrealsense2 as rs
+    """Depth maps of a RealSense camera with its own calibration."""
+    try:
+        import pyrealsense2 as rs
+    except ImportError:
+        raise SystemExit("--camera realsense needs: pip install pyrealsense2") from None
 
     pipeline = rs.pipeline()
     profile = pipeline.start()
@@ -60,8 +69,10 @@ def realsense():
     factor = 1 / profile.get_device().first_depth_sensor().get_depth_scale()
     try:
         while True:
-            depth = np.asanyarray(pipeline.wait_for_frames().get_depth_frame().get_data()).copy()
-            yield rangeedge.RangeImage(depth, {"K": (lens.fx, lens.fy, lens.ppx, lens.ppy), "depthFactor": factor})
+            seen = pipeline.wait_for_frames().get_depth_frame()
+            if seen:  # none came with the frames of other sensors
+                depth = np.asanyarray(seen.get_data()).copy()
+                yield rangeedge.RangeImage(depth, {"K": (lens.fx, lens.fy, lens.ppx, lens.ppy), "depthFactor": factor})
     finally:
         pipeline.stop()
 
@@ -77,9 +88,28 @@ def main(argv=None):
     arguments.add_argument("--camera", choices=["openni", "realsense"], help="take frames from a camera")
     arguments.add_argument("--show", action="store_true", help="in a window, until a key is pressed")
     args = arguments.parse_args(argv)
+    if args.camera == "openni" and args.K is None:
+        arguments.error("--camera openni needs -K: OpenCV does not tell the focal lengths")
 
-    shown, params, detector = None, None, None
-    for index, image in enumerate(frames(args)):
+    stream, shown = frames(args), None
+    try:
+        for shown in edges_and_regions(stream):
+            if args.show:
+                cv2.imshow("rangeedge", shown)
+                if cv2.waitKey(1) >= 0:
+                    break
+    except KeyboardInterrupt:  # as a stream of a camera ends
+        pass
+    finally:
+        stream.close()
+    if shown is not None and not args.show:
+        write(args.out, "live.png", shown)
+
+
+def edges_and_regions(stream):
+    """A picture of every frame."""
+    params, detector = None, None
+    for index, image in enumerate(stream):
         if (seen := rangeedge.ScanLineParams(**image.geometry)) != params:
             params = seen
             detector = rangeedge.createScanLineDetector(params)
@@ -89,14 +119,8 @@ def main(argv=None):
         labels = rangeedge.segmentRegions(image.src, **image.geometry)
         end = time.perf_counter()
         text = f"frame {index}: edges {1000 * (between - start):.0f} ms, regions {1000 * (end - between):.0f} ms"
-        print(f"{text}; {np.count_nonzero(edges)} edge pixels, {labels.max()} regions")
-        shown = picture(image, edges, labels, text)
-        if args.show:
-            cv2.imshow("rangeedge", shown)
-            if cv2.waitKey(1) >= 0:
-                break
-    if shown is not None and not args.show:
-        write(args.out, "live.png", shown)
+        print(f"{text}; {np.count_nonzero(edges)} edge pixels, {labels.max()} regions", flush=True)
+        yield picture(image, edges, labels, text)
 
 
 def parser(doc):

@@ -69,8 +69,18 @@ def draw(picture, found, K, cup):
         foot, tip = pixels([place.center, place.center + 0.06 * place.normal], K)
         cv2.polylines(picture, [pixels(rim, K)], True, (255, 255, 255), 2, cv2.LINE_AA)
         cv2.arrowedLine(picture, foot, tip, (66, 228, 240), 2, cv2.LINE_AA, tipLength=0.25)
-        cv2.putText(picture, str(rank), tip + 5, cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
+        number(picture, str(rank), tip, tip - foot)
     return picture
+
+
+def number(picture, text, place, direction):
+    """A number beyond a place, seen in a direction, on whatever is there."""
+    font, size = cv2.FONT_HERSHEY_SIMPLEX, 0.5
+    width, height = cv2.getTextSize(text, font, size, 1)[0]
+    away = direction / np.linalg.norm(direction) if direction.any() else np.array([0, -1])
+    corner = place + 14 * away + (-width / 2, height / 2)
+    for colour, thickness in (((0, 0, 0), 4), ((255, 255, 255), 1)):
+        cv2.putText(picture, text, np.rint(corner).astype(int), font, size, colour, thickness, cv2.LINE_AA)
 
 
 def pixels(points, K):

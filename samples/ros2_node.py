@@ -19,6 +19,7 @@ first.
 """
 
 import argparse
+from array import array
 from pathlib import Path
 
 import numpy as np
@@ -27,18 +28,18 @@ import rangeedge
 from rangeedge.recording.messages import camera_of, range_image_of
 from rangeedge.synthetic import demoScene, kinectCamera, kinectNoise, renderScene
 
-_HEADER = ("builtin_interfaces/msg/Time", "std_msgs/msg/Header")
-
 
 class EdgeDetector:
     """What the node does, without ROS: messages in, fields of a message out."""
 
     def __init__(self):
-        self.detector = None
+        self.detector = self.params = None
 
     def see_camera(self, message):
-        """Take over the camera of a CameraInfo."""
-        self.detector = rangeedge.createScanLineDetector(rangeedge.ScanLineParams(**camera_of(message)))
+        """Take over the camera of a CameraInfo, if it says one that is new."""
+        params = rangeedge.ScanLineParams(**camera_of(message))
+        if params.K is not None and (self.detector is None or params != self.params):
+            self.params, self.detector = params, rangeedge.createScanLineDetector(params)
 
     def edges_of(self, message):
         """The fields of the Image of edges of a depth image; None while its camera is not known."""
@@ -50,25 +51,42 @@ class EdgeDetector:
         return {"header": message.header, **fields, "data": edges.ravel()}
 
 
-def spin():
+def spin(argv):
     """Run as a node until it is interrupted."""
     import rclpy
+    from rclpy.executors import ExternalShutdownException
     from rclpy.node import Node
     from rclpy.qos import qos_profile_sensor_data
     from sensor_msgs.msg import CameraInfo, Image
 
-    rclpy.init()
+    rclpy.init(args=argv)
     node, detector = Node("rangeedge"), EdgeDetector()
     publisher = node.create_publisher(Image, "edges", 1)
 
-    def publish(message):
-        fields = detector.edges_of(message)
-        if fields is not None:
-            publisher.publish(Image(**{**fields, "data": fields["data"].tobytes()}))
+    def see(message):
+        try:
+            detector.see_camera(message)
+        except ValueError as problem:
+            node.get_logger().warning(f"camera_info: {problem}")
 
-    node.create_subscription(CameraInfo, "camera_info", detector.see_camera, qos_profile_sensor_data)
+    def publish(message):
+        try:
+            fields = detector.edges_of(message)
+        except ValueError as problem:  # garbled, or no depth: the next one may be better
+            node.get_logger().warning(f"depth: {problem}")
+            return
+        if fields is not None:
+            publisher.publish(Image(**{**fields, "data": array("B", fields["data"].tobytes())}))
+
+    node.create_subscription(CameraInfo, "camera_info", see, qos_profile_sensor_data)
     node.create_subscription(Image, "depth", publish, qos_profile_sensor_data)
-    rclpy.spin(node)
+    try:
+        rclpy.spin(node)
+    except (KeyboardInterrupt, ExternalShutdownException):
+        pass
+    finally:
+        node.destroy_node()
+        rclpy.try_shutdown()
 
 
 def replay(bag, topic, out):
@@ -127,7 +145,7 @@ def main(argv=None):
     arguments.add_argument("--out", type=Path, default=Path("out"), help="folder for the bags (default: out)")
     args, ros = arguments.parse_known_args(argv)
     if ros:
-        return spin()
+        return spin(argv)
     args.out.mkdir(parents=True, exist_ok=True)
     if args.bag is None:
         args.bag = unused(args.out / "recorded")

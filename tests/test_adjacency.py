@@ -1,11 +1,12 @@
 """Which regions touch, by hand on small grids and against the true faces of rendered scenes."""
 
+import cv2
 import numpy as np
 import pytest
 
 import rangeedge
 from rangeedge import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, regionAdjacency, regionCorners
-from rangeedge.synthetic import box, cylinder, gaussianNoise, pinholeCamera, plane, renderScene
+from rangeedge.synthetic import box, cylinder, gaussianNoise, pinholeCamera, plane, renderScene, roof
 
 K = np.array([[300.0, 0, 159.5], [0, 300, 119.5], [0, 0, 1]])
 CAMERA = pinholeCamera(K, (320, 240))
@@ -151,3 +152,14 @@ def test_planes_that_do_not_meet_in_a_corner_have_none():
     assert len(regionCorners(np.zeros((5, 6)), np.zeros((5, 6), np.int32), noise=0.1)) == 0
     with pytest.raises(rangeedge.error, match="regionCorners: `labels` must be"):
         regionCorners(np.zeros((5, 6)), np.zeros((5, 6)))
+
+
+@pytest.mark.parametrize("convex", [True, False])
+def test_edges_rounded_off_by_the_sensor_keep_their_angle(convex):
+    rendering = renderScene(roof(90, orientation=10, convex=convex), CAMERA)
+    depth = cv2.GaussianBlur(rendering.depth, (0, 0), 2.0)
+    labels = rendering.labels.copy()
+    labels[:, :145] = labels[:, 175:] = 0  # narrow faces
+    labels[:110] = labels[130:] = 0
+    (pair,) = regionAdjacency(depth, labels, K=K, noise=0.0005)
+    assert pair["dihedral"] == pytest.approx(90 if convex else 270, abs=3)

@@ -3,6 +3,7 @@
 import json
 import os
 import sys
+import warnings
 from pathlib import Path
 
 import cv2
@@ -149,6 +150,36 @@ def test_images_of_one_name_keep_their_suffix_or_their_folders(images, tmp_path)
     assert all((tmp_path / "two" / folder / "report.json").exists() for folder in (folders[0], folders[3]))
 
 
+def test_no_frame_has_the_name_of_the_folder_of_others(images, tmp_path):
+    np.save(tmp_path / "frame0.npy", np.full((2, 30, 40), 1500, np.uint16))
+    items = list(detectBatch([images[0], tmp_path / "frame0.npy"], tmp_path / "out", K=K))
+    folders = [Path(item.folder).relative_to(tmp_path / "out").as_posix() for item in items]
+    assert folders == ["frame0.png", "frame0/0000", "frame0/0001"]
+
+
+def test_results_never_replace_what_is_read(images, tmp_path):
+    before = images[0].read_bytes()
+    with pytest.raises(error, match=r"would replace the input .*frame0\.png"):
+        list(runBatch(images, tmp_path, form="png", K=K))
+    assert images[0].read_bytes() == before
+    assert not (tmp_path / "manifest.jsonl").exists()
+
+
+def test_warnings_are_in_the_manifest(tmp_path):
+    stack = np.full((3, 120, 160), 1500, np.uint16)
+    stack[:, 30:80, 40:110] = 1000
+    np.save(tmp_path / "walk.npy", stack)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        items = list(runBatch(tmp_path / "walk.npy", tmp_path / "out", form="png", jobs=2))
+        clear = list(runBatch(tmp_path / "walk.npy", tmp_path / "clear", form="png", pixelSize=5.0))
+    assert all("geometry is not given" in warning for item in items for warning in item.warnings)
+    assert [len(item.warnings) for item in items] == [1] * 3
+    for out, found in (("out", items), ("clear", clear)):
+        lines = [json.loads(line) for line in (tmp_path / out / "manifest.jsonl").read_text().splitlines()]
+        assert [tuple(line.get("warnings", ())) for line in lines] == [item.warnings for item in found]
+
+
 def test_one_image_twice(images, tmp_path):
     with pytest.raises(error, match="is given twice"):
         detectBatch([images[0], images[0]], tmp_path / "out")
@@ -160,7 +191,7 @@ def test_command_reports_failures_at_the_end(images, tmp_path, capsys):
     assert main([*argv, "--jobs", "2"]) == 1
     said, complaint = capsys.readouterr()
     assert said.splitlines()[-1] == "2 written, 0 skipped, 1 failed"
-    assert complaint.startswith(str(images[1]))
+    assert complaint.startswith(f"failed: cannot read '{images[1]}': it is none of PNG")
     images[1].unlink()
     assert main([*argv[:2], *argv[4:], "--force"]) == 0
 
@@ -283,6 +314,14 @@ class TestForms:
         assert "40 x 20 pixels, the store has frames of 40 x 30" in items[3].message
         assert zarr.open_group(str(out), mode="r")["labels"].shape == (7, 30, 40)
 
+    def test_the_size_of_a_store_is_that_of_two_frames(self, tmp_path):
+        zarr = pytest.importorskip("zarr")
+        for index, rows in enumerate((20, 30, 30)):
+            imwriteRange(tmp_path / f"{index}.png", np.full((rows, 40), 1500, np.uint16))
+        items = list(runBatch(tmp_path, tmp_path / "out.zarr", K=K))
+        assert states(items) == ["failed", "written", "written"]
+        assert zarr.open_group(str(tmp_path / "out.zarr"), mode="r")["edges"].shape == (3, 30, 40)
+
     def test_extras_that_are_missing_are_named(self, stack, tmp_path, monkeypatch):
         monkeypatch.setitem(sys.modules, "zarr", None)
         with pytest.raises(error, match=r"needs zarr: pip install 'rangeedge\[zarr\]'"):
@@ -303,7 +342,7 @@ class TestCommand:
         assert main(argv) == 0
         assert capsys.readouterr().out.splitlines()[-1] == "3 written, 0 skipped, 0 failed"
         assert main(self.argv(stack[0], tmp_path, "--min-area", "20")) == 2
-        assert "`minArea` is no option of 'detect'" in capsys.readouterr().err
+        assert "--min-area is no option of 'detect'" in capsys.readouterr().err
 
     def test_a_bar_where_a_person_looks_on(self, stack, tmp_path, capsys, monkeypatch):
         pytest.importorskip("tqdm")
@@ -321,3 +360,45 @@ class TestCommand:
         said, shown = capsys.readouterr()
         assert said.count("written ") == 3
         assert shown == ""
+
+    def test_each_kind_of_failure_and_of_warning_is_told_once(self, tmp_path, capsys):
+        for index in range(6):
+            imwriteRange(tmp_path / f"{index}.png", np.full((120, 160), 1500, np.uint16))
+        for index in (1, 2, 4):
+            (tmp_path / f"{index}.png").write_bytes(b"garbled")
+        assert main(self.argv(tmp_path, tmp_path, "--form", "png")) == 1
+        said = capsys.readouterr().err.splitlines()
+        assert [line.split(": ")[0] for line in said] == ["warning", "failed", "warning", "failed"]
+        first, broken, more_warnings, more_failures = said
+        assert first.startswith(f"warning: {tmp_path / '0.png'}: ")
+        assert "give -K" in first
+        assert broken.startswith(f"failed: cannot read '{tmp_path / '1.png'}': it is none of PNG")
+        assert more_warnings == (
+            f"warning: as {tmp_path / '0.png'}: 2 more, see the manifest: {tmp_path / '3.png'}, {tmp_path / '5.png'}"
+        )
+        assert more_failures == (
+            f"failed: as {tmp_path / '1.png'}: 2 more, see the manifest: {tmp_path / '2.png'}, {tmp_path / '4.png'}"
+        )
+
+    def test_names_that_are_no_text(self, tmp_path, capsys):
+        name = os.fsdecode(bytes(tmp_path / "a") + b"\xff.png")
+        imwriteRange(name, np.full((30, 40), 1500, np.uint16))
+        assert main(self.argv(name, tmp_path, "-K", "50,50,19.5,14.5")) == 0
+        assert "a\\udcff.png" in capsys.readouterr().out
+        assert (tmp_path / "out" / Path(name).stem / "report.json").is_file()
+
+    @pytest.mark.parametrize(
+        ("more", "message"),
+        [
+            (["--overlap", "9"], "--overlap goes with --blocks"),
+            (["--per-task", "9"], "--per-task goes with --dask"),
+            (["--blocks", "99", "--form", "png"], "--form does not go with --blocks"),
+            (["--blocks", "9"], "--blocks must be an integer >= 64, got 9"),
+            (["--topic", "/depth"], "--topic = /depth, but no input is a bag"),
+            (["--jobs", "-1"], "--jobs must be an integer >= 1"),
+        ],
+    )
+    def test_mistakes_are_told_in_the_words_of_the_command_line(self, stack, tmp_path, capsys, more, message):
+        assert main(self.argv(stack[0], tmp_path, *more)) == 2
+        assert message in capsys.readouterr().err
+        assert not (tmp_path / "out").exists()

@@ -1,5 +1,7 @@
 """One image in blocks: what is exact, what is close, and how it goes on."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,8 @@ from rangeedge import (
     error,
     imreadRange,
     imwriteRange,
+    overallStrength,
+    salienceDistanceTransform,
     segmentRegions,
 )
 from rangeedge.app.cli import main
@@ -210,6 +214,78 @@ class TestRuns:
         )
         assert ones == others
 
+    def test_distances_by_salience_are_those_of_the_whole(self, zarr, tmp_path):
+        np.save(tmp_path / "a.npy", terrain())
+        out = tmp_path / "out.zarr"
+        argv = ["batch", str(tmp_path / "a.npy"), "--height-map", "--pixel-size", "0.5", "--noise", "0.02"]
+        argv += ["--blocks", "64", "--overlap", "8", "--out", str(out)]
+        assert main(argv) == 0
+        assert main([*argv, "--jump-cut", "5"]) == 0
+        found = {name: array[:] for name, array in zarr.open_group(str(out), mode="r").arrays()}
+        salience = overallStrength(found["jump"], found["crease"], 5.0)
+        assert np.count_nonzero((salience > 0) & (salience < 100)) > 0
+        assert np.array_equal(found["salience"], salienceDistanceTransform(salience))
+        lines = [json.loads(line) for line in (tmp_path / "out.zarr.salience.manifest.jsonl").read_text().splitlines()]
+        assert [line["counts"] for line in lines] == [{"unsurePixels": 0}] * 30
+
+    def test_distances_by_salience_beyond_reach_are_never_too_small(self, zarr, tmp_path, monkeypatch):
+        monkeypatch.setattr("rangeedge.app.blocks._Saliences.reach", 20)
+        np.save(tmp_path / "a.npy", terrain())
+        out = tmp_path / "out.zarr"
+        list(runBlocks(tmp_path / "a.npy", out, blockSize=64, overlap=8, jumpCut=5.0, **OPTIONS))
+        found = {name: array[:] for name, array in zarr.open_group(str(out), mode="r").arrays()}
+        whole = salienceDistanceTransform(overallStrength(found["jump"], found["crease"], 5.0))
+        lines = [json.loads(line) for line in (tmp_path / "out.zarr.salience.manifest.jsonl").read_text().splitlines()]
+        unsure = sum(line["counts"]["unsurePixels"] for line in lines)
+        assert 0 < np.count_nonzero(found["salience"] != whole) <= unsure
+        assert (found["salience"] >= whole).all()
+
+    @pytest.mark.parametrize("jobs", [1, 2])
+    def test_masks_and_maps_of_noise(self, zarr, tmp_path, jobs):
+        np.save(tmp_path / "a.npy", terrain())
+        mask = np.ones((260, 330), np.uint8)
+        mask[90:130, :200] = 0
+        noise = np.full((260, 330), 0.02)
+        noise[:, 200:] = 3.0  # where it hides the houses
+        np.save(tmp_path / "noise.npy", noise)
+        options = {**OPTIONS, "mask": mask, "noise": np.load(tmp_path / "noise.npy", mmap_mode="r")}
+        out = tmp_path / "out.zarr"
+        size = {"blockSize": 128, "overlap": 330}  # every block sees all of it, and so nothing may differ
+        items = list(runBlocks(tmp_path / "a.npy", out, jobs=jobs, **size, **options))
+        assert {item.state for item in items} == {"written"}
+        found = zarr.open_group(str(out), mode="r")["edges"][:]
+        edges = detectEdges(terrain(), **{**options, "noise": noise})
+        assert np.count_nonzero(edges[:, :190]) > 200
+        assert np.count_nonzero(edges[:, 210:]) < 0.1 * np.count_nonzero(detectEdges(terrain(), **OPTIONS)[:, 210:])
+        assert np.array_equal(found, edges)
+        again = list(runBlocks(tmp_path / "a.npy", out, **size, **options))
+        assert {item.state for item in again} == {"skipped"}
+        mask[0, 0] = 0
+        assert {item.state for item in runBlocks(tmp_path / "a.npy", out, **size, **options)} == {"written"}
+
+    def test_only_blocks_are_done_again_whose_mask_has_changed(self, zarr, tmp_path):
+        np.save(tmp_path / "a.npy", terrain())
+        mask = np.ones((260, 330), bool)
+        size = {"blockSize": 128, "overlap": 48}
+        list(runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", mask=mask, **size, **OPTIONS))
+        mask[:40, :40] = False
+        items = list(runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", mask=mask, **size, **OPTIONS))
+        assert [item.state for item in items[:9]] == ["written", *["skipped"] * 8]
+        assert not zarr.open_group(str(tmp_path / "out.zarr"), mode="r")["edges"][:38, :38].any()
+
+    def test_the_noise_is_that_of_pixels_that_are_used(self, zarr, tmp_path):
+        heights = terrain()
+        mask = np.zeros((260, 330), np.uint8)
+        mask[:, :200] = 1
+        heights[:, 200:] += np.random.default_rng(1).normal(0, 3, (260, 130)).astype(np.float32)
+        np.save(tmp_path / "a.npy", heights)
+        options = {"heightMap": True, "pixelSize": 0.5, "mask": mask}
+        list(runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", blockSize=128, overlap=48, **options))
+        found = zarr.open_group(str(tmp_path / "out.zarr"), mode="r")["edges"][:]
+        edges = detectEdges(heights, **options)
+        assert np.count_nonzero(edges) > 200
+        assert np.count_nonzero(found != edges) < 0.05 * np.count_nonzero(edges)
+
     def test_noise_is_estimated_once(self, zarr, tmp_path):
         np.save(tmp_path / "a.npy", terrain())
         options = {"heightMap": True, "pixelSize": 0.5}
@@ -225,7 +301,10 @@ class TestRuns:
         ({"task": "lines"}, "`task` must be 'detect' or 'segment'"),
         ({"blockSize": 8}, "`blockSize`"),
         ({"overlap": -1}, "`overlap`"),
-        ({"noise": np.ones((3, 4))}, "`noise` must be a number or a NoiseModel with blocks"),
+        ({"noise": np.ones((3, 4))}, r"`noise` must be an array of shape \(260, 330\)"),
+        ({"mask": np.ones((330, 260), np.uint8)}, r"`mask` must be an array of shape \(260, 330\)"),
+        ({"jumpCut": 0}, "`jumpCut`"),
+        ({"jumpCut": 1.0, "task": "segment"}, "`jumpCut` must be None for 'segment'"),
         ({"minArea": 9}, "`minArea` is no option of 'detect'"),
     ],
 )

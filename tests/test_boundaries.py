@@ -1,5 +1,7 @@
 """Outlines of regions as polygons with holes."""
 
+import itertools
+
 import cv2
 import numpy as np
 import pytest
@@ -116,6 +118,50 @@ def test_simplified_neighbours_have_the_same_vertices(labels, tolerance):
     }
     for a, b in ways:
         assert (b, a) in ways or (a, b) in beside_none or (b, a) in beside_none
+
+
+def crossings(found):
+    """Pairs of segments of all arcs that have more in common than one end of both."""
+    lines = [found.vertices[arc["first"] : arc["first"] + arc["count"]].tolist() for arc in found.arcs]
+    segments = [(tuple(a), tuple(b)) for line in lines for a, b in itertools.pairwise(line)]
+
+    def side(a, b, c):
+        return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+    def holds(a, b, c):
+        return side(a, b, c) == 0 and all(min(a[k], b[k]) <= c[k] <= max(a[k], b[k]) for k in (0, 1))
+
+    count = 0
+    for s, t in itertools.combinations(segments, 2):
+        common = set(s) & set(t)
+        touching = [c for pair, other in ((s, t), (t, s)) for c in other if holds(*pair, c) and c not in common]
+        across = side(*s, t[0]) * side(*s, t[1]) < 0 and side(*t, s[0]) * side(*t, s[1]) < 0
+        count += bool(touching) or len(common) == 2 or (across and not common)
+    return count
+
+
+@settings(max_examples=150, deadline=None)
+@given(IMAGES, st.sampled_from([0.3, 0.75, 1.0, 2.0, 5.0]), st.integers(1, 3))
+def test_simplified_outlines_do_not_cross(labels, tolerance, size):
+    found = regionBoundaries(np.kron(labels, np.ones((size, size), np.int32)), tolerance=tolerance)
+    assert crossings(found) == 0
+    assert all(region.area > 0 and len(region.outline) >= 3 for region in found)
+
+
+def test_narrow_regions_keep_their_area():
+    # Two lines of pixels beside each other, which a tolerance of two pixels would make one line.
+    found = regionBoundaries(labelled("0000000000 1111111111 2222222222 0000000000"), tolerance=2.0)
+    assert [region.area > 0 for region in found] == [True, True]
+    assert crossings(found) == 0
+
+
+@pytest.mark.parametrize("tolerance", [0.5, 2.0, 5.0])
+def test_outlines_moved_onto_lines_do_not_cross(tolerance):
+    axes = cv2.Rodrigues(np.array([0.5, 0.6, 0.2]))[0]
+    plates = [box((0, 0.03 * k, 1.0 - 0.01 * k), (0.3, 0.02, 0.012), axes) for k in range(-3, 4)]
+    rendering = renderScene([plane((0, 0, 1.2), (0.2, 0, -1)), *plates], CAMERA)
+    depth = rendering.depth + np.random.default_rng(0).normal(0, 0.002, rendering.depth.shape)
+    assert crossings(regionBoundaries(rendering.labels, depth, tolerance, K=K)) == 0
 
 
 def test_no_border_lies_farther_off_than_the_tolerance():

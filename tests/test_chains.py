@@ -330,3 +330,29 @@ def test_bad_options_are_named(options, text):
     with pytest.raises(rangeedge.error) as problem:
         linkEdges(np.ones((4, 5)), **options)
     assert text in str(problem.value)
+
+
+def bar(depth_along):
+    """A bar whose straight side passes rows and columns, and whose depth is a function of the row."""
+    rows, cols = np.mgrid[:96, :80].astype(float)
+    return np.where(cols + 0.27 * rows < 50.3, depth_along(rows), 400.0)
+
+
+@pytest.mark.parametrize(
+    ("depth_along", "parts"),
+    [
+        pytest.param(lambda v: 100 + 0.6 * v, 1, id="straight"),
+        pytest.param(lambda v: 100 + 0.006 * (v - 40) ** 2, 1, id="bent"),
+        pytest.param(lambda v: 100 + 0.6 * np.abs(v - 45.2), 2, id="one-corner"),
+        pytest.param(lambda v: 100 + np.abs((v + 2) % 64 - 32), 3, id="two-corners"),
+    ],
+)
+@pytest.mark.parametrize("noise", [0, 0.1])
+def test_an_edge_straight_in_the_image_ends_where_it_turns_in_space(depth_along, parts, noise):
+    depth = bar(depth_along) + noise * np.random.default_rng(5).normal(size=(96, 80))
+    jumps = [c for c in linkEdges(depth, pixelSize=1, noise=max(noise, 1e-3)) if c.jump > 100]
+    assert len(jumps) == parts
+    for chain in jumps:
+        place = chain.points["point"]
+        assert distance_to_line(place, place[0], place[-1]).max() < (3 if parts > 1 else 20)
+    assert sum(len(chain) for chain in jumps) >= 85

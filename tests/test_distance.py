@@ -12,6 +12,8 @@ from fractions import Fraction
 import cv2
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import rangeedge
 from rangeedge.constants import SALIENCE_ADDITIVE, SALIENCE_MULTIPLICATIVE
@@ -428,8 +430,12 @@ def in_sight(barrier, one, other):
     return True
 
 
-def brute_geodesic(edges, barrier, pixel=(1.0, 1.0)):
-    """Dijkstra over all pairs of pixels in sight of each other."""
+def brute_geodesic(edges, barrier, pixel=(1.0, 1.0), wrap=False):
+    """Dijkstra over all pairs of pixels in sight of each other; of a map that wraps over five of it side by side."""
+    if wrap:
+        width = edges.shape[1]
+        around = brute_geodesic(np.tile(edges, (1, 5)), np.tile(barrier, (1, 5)), pixel)
+        return around[:, 2 * width : 3 * width]
     free = [tuple(p) for p in np.argwhere(barrier == 0)]
     length = {p: 0.0 if edges[p] else np.inf for p in free}
     queue = [(0.0, p) for p in free if edges[p]]
@@ -461,6 +467,55 @@ def test_ways_around_barriers_against_brute_force(seed):
     assert (found[reached] <= shortest[reached] * 1.0824 + 1e-6).all()
     close = found[reached] <= shortest[reached] * (1 + 1e-6)
     assert close.size < 20 or close.mean() > 0.85
+
+
+@st.composite
+def mazes(draw):
+    """Edges, a barrier of any density, the size of a pixel and whether the map wraps; all small."""
+    wrap = draw(st.booleans())
+    shape = draw(st.integers(1, 6)), draw(st.integers(1, 5 if wrap else 8))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    barrier = rng.random(shape) < draw(st.sampled_from([0, 0.15, 0.3, 0.5, 1]))
+    edges = rng.random(shape) < draw(st.sampled_from([0, 0.05, 0.2, 1]))
+    return edges, barrier, draw(st.sampled_from([(1.0, 1.0), (3.0, 1.0), (1.0, 100.0), (0.001, 0.0005)])), wrap
+
+
+@settings(max_examples=60, deadline=None)
+@given(mazes())
+def test_mazes_of_any_pixels_against_brute_force(maze):
+    edges, barrier, pixel, wrap = maze
+    found, labels = distanceTransformWithLabels(edges, barrier=barrier, pixelSize=pixel, wrap=wrap)
+    shortest = brute_geodesic(edges, barrier, pixel, wrap)
+    reached = np.isfinite(shortest)
+    np.testing.assert_array_equal(np.isfinite(found), reached)
+    np.testing.assert_array_equal(labels >= 0, reached)
+    assert (edges & ~barrier).flat[labels[reached]].all()
+    assert (found >= shortest * (1 - 1e-6)).all()
+    # What steps to eight neighbours are longer than a straight line at most: halfway between two of them.
+    diagonal = np.arctan2(pixel[1], pixel[0])
+    assert (found <= shortest / np.cos(max(diagonal, np.pi / 2 - diagonal) / 2) * (1 + 1e-6)).all()
+    # Where the nearest edge is in sight, there is nothing longer about it.
+    straight = distanceTransform(edges & ~barrier, pixelSize=pixel, wrap=wrap)
+    seen = reached & (shortest <= straight * (1 + 1e-7))
+    np.testing.assert_allclose(found[seen], shortest[seen], rtol=1e-6)
+
+
+def test_of_two_edges_as_near_the_one_in_sight_counts():
+    edges, barrier = np.zeros((5, 4), np.uint8), np.zeros((5, 4), np.uint8)
+    edges[4, 0] = edges[4, 2] = 1
+    barrier[1, 2] = barrier[2, 0] = barrier[3, 3] = 1  # the second is in the way to the edge at the left
+    distance, labels = distanceTransformWithLabels(edges, barrier=barrier)
+    assert distance[0, 1] == np.float32(np.sqrt(17))
+    assert labels[0, 1] == 4 * 4 + 2
+
+
+def test_either_way_round_is_as_good():
+    edges, barrier = np.zeros((2, 4), np.uint8), np.zeros((2, 4), np.uint8)
+    edges[0, 0] = 1
+    barrier[0, 1] = 1
+    distance = distanceTransform(edges, barrier=barrier, wrap=True)
+    assert distance[0, 2] == 2
+    assert distance[1, 2] == np.float32(np.sqrt(5))
 
 
 def test_barrier_by_hand():

@@ -52,6 +52,12 @@ def test_parameters_are_those_of_the_detector(session):
     for name in (*SLIDERS, *SWITCHES):
         session.change(name, DETECTION[name].default)
     assert session.options == {}
+    for name in SLIDERS:  # as when they are put back
+        session.change(name, session.value(name))
+    assert session.options == {}
+    session.change("minSignificance", 0.0)
+    expected = rangeedge.detectEdges(src, **geometry, minSignificance=0)
+    assert np.array_equal(session.picture("thin map")[..., 0], expected)
 
 
 def test_exports_make_the_same_edges(session, tmp_path, monkeypatch):
@@ -112,12 +118,19 @@ def test_wrong_uploads_change_nothing(session):
 def test_geometry_as_typed(session):
     with pytest.raises(rangeedge.error):
         session.place("525, 525", "", height_map=False)
-    with pytest.raises(rangeedge.error, match="numbers"):
+    with pytest.raises(rangeedge.error, match="`K` must be four numbers"):
         session.place("a, b", "", height_map=False)
+    with pytest.raises(rangeedge.error, match="depthFactor"):
+        session.place("", "", height_map=False, depth_factor="many")
     session.place("500, 500, 320, 240", "", height_map=False)
-    assert np.allclose(session.geometry["K"], (500, 500, 320, 240))
+    assert session.typed("K") == "500, 500, 320, 240"
     session.place("", "0.002", height_map=True)
     assert session.geometry == {"pixelSize": 0.002, "heightMap": True}
+    session.place("500 500 320 240", "", height_map=False, depth_factor="5000", invalid="0, 65535")
+    assert [session.typed(name) for name in ("K", "pixelSize", "depthFactor", "invalid")] == [
+        "500, 500, 320, 240", "", "5000", "0, 65535",
+    ]  # fmt: skip
+    assert session.geometry["depthFactor"] == 5000
 
 
 def test_command_says_what_is_missing(monkeypatch, capsys):
@@ -166,7 +179,7 @@ def _open(port):
         return False
 
 
-def _wait(condition, seconds=60):
+def _wait(condition, seconds=120):
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         found = condition()

@@ -2,6 +2,7 @@
 
 import json
 import struct
+import tracemalloc
 from types import SimpleNamespace
 
 import cv2
@@ -63,6 +64,35 @@ class TestStacks:
         assert frames[0].read().geometry["depthFactor"] == 500
         assert np.array_equal(frames[0].read().geometry["K"], K)
 
+    @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+    def test_npz_in_any_order(self, tmp_path, save):
+        save(tmp_path / "a.npz", depth=depths())
+        save(tmp_path / "f.npz", depth=np.asfortranarray(depths()))
+        for name in ("a", "f"):
+            frames = framesOf(tmp_path / f"{name}.npz")
+            for index in (2, 0, 3, 3, 1):
+                assert_frames(frames[index : index + 1], depths()[index : index + 1])
+
+    def test_npz_takes_the_memory_of_one_frame(self, tmp_path):
+        stack = np.random.default_rng(0).integers(500, 540, (70, 480, 640)).astype(np.uint16)
+        np.savez(tmp_path / "a.npz", depth=stack)
+        tracemalloc.start()
+        try:
+            frames = framesOf(tmp_path / "a.npz")
+            assert all(np.array_equal(frame.read().src, src) for frame, src in zip(frames, stack, strict=True))
+            assert tracemalloc.get_traced_memory()[1] < 2**25 < stack.nbytes
+        finally:
+            tracemalloc.stop()
+
+    def test_a_garbled_npz_is_noticed_before_its_first_frame_is_taken(self, tmp_path):
+        np.savez(tmp_path / "a.npz", depth=depths())
+        data = bytearray((tmp_path / "a.npz").read_bytes())
+        data[len(data) // 2] ^= 1
+        (tmp_path / "a.npz").write_bytes(data)
+        (frame,) = framesOf(tmp_path / "a.npz")
+        with pytest.raises(error, match=r"cannot read .*a\.npz': .*CRC"):
+            frame.read()
+
     def test_tiff_of_many_pages(self, tmp_path):
         assert cv2.imwritemulti(str(tmp_path / "a.tif"), list(depths()))
         assert_frames(framesOf(tmp_path / "a.tif"), depths())
@@ -77,6 +107,26 @@ class TestStacks:
         assert_frames(framesOf(tmp_path / "a.zarr"), depths())
         assert framesOf(tmp_path / "a.zarr")[1].read().geometry == {"K": K.tolist()}
         assert framesOf(tmp_path / "b.zarr")[1].read().geometry == {"pixelSize": 0.5}
+
+    @pytest.mark.parametrize("version", [2, 3])
+    def test_chunks_of_a_zarr_that_are_truncated(self, tmp_path, version):
+        zarr = pytest.importorskip("zarr")
+        zarr.create_array(str(tmp_path / "a.zarr"), data=depths(), chunks=(1, 30, 40), zarr_format=version)
+        chunk = tmp_path / "a.zarr" / ("2.0.0" if version == 2 else "c/2/0/0")
+        chunk.write_bytes(chunk.read_bytes()[:-5])
+        frames = framesOf(tmp_path / "a.zarr")
+        assert_frames([*frames[:2], frames[3]], depths()[[0, 1, 3]])
+        with pytest.raises(error, match=r"cannot read .*a\.zarr', frame 2"):
+            frames[2].read()
+
+    @pytest.mark.parametrize("name", ["zarr.json", ".zarray"])
+    def test_a_zarr_that_is_garbled(self, tmp_path, name):
+        pytest.importorskip("zarr")
+        (tmp_path / "a.zarr").mkdir()
+        (tmp_path / "a.zarr" / name).write_text("{")
+        (frame,) = framesOf(tmp_path / "a.zarr")
+        with pytest.raises(error, match=r"cannot read .*a\.zarr'"):
+            frame.read()
 
     def test_a_stack_that_is_written_again_is_read_again(self, tmp_path):
         np.save(tmp_path / "a.npy", depths())
@@ -110,6 +160,29 @@ class TestFolders:
         given = frames[0].read(K=(60, 60, 20, 15)).geometry
         assert given == {"K": (60, 60, 20, 15)}
 
+    def test_a_camera_that_cannot_be_read_fails_frames_that_have_none(self, tmp_path):
+        imwriteRange(tmp_path / "a.png", depths()[0])
+        imwriteRange(tmp_path / "b.npz", depths()[0], K=K)
+        (tmp_path / "camera.yaml").write_text("nothing: here\n")
+        without, own = framesOf(tmp_path)
+        with pytest.raises(error, match=r"camera of its folder cannot be used: .*camera\.yaml.*; or give -K"):
+            without.read()
+        assert without.read(K=(60, 60, 20, 15)).geometry == {"K": (60, 60, 20, 15)}
+        assert np.array_equal(own.read().geometry["K"], K)
+
+    def test_the_camera_of_a_file_goes_before_that_of_its_folder(self, tmp_path):
+        imwriteRange(tmp_path / "b.npz", depths()[0], K=K)
+        (tmp_path / "camera.json").write_text(json.dumps({"fx": 9, "fy": 9, "ppx": 1, "ppy": 1, "coeffs": [0.1] * 5}))
+        (frame,) = framesOf(tmp_path)
+        geometry = frame.read().geometry
+        assert geometry.keys() == {"K"}
+        assert np.array_equal(geometry["K"], K)
+
+    def test_folders_in_a_folder(self, tmp_path):
+        (tmp_path / "in").mkdir()
+        with pytest.raises(error, match=r"no range images; of the folders in it, give .*\*\*"):
+            framesOf(tmp_path)
+
     def test_patterns(self, tmp_path):
         for name in ("a1.png", "a2.png", "b1.png"):
             imwriteRange(tmp_path / name, depths()[0])
@@ -129,6 +202,15 @@ class TestFolders:
         assert frames[0].read().geometry == {"depthFactor": 5000, "K": (525, 525, 319.5, 239.5)}
         with pytest.raises(error, match=r"9\.5\.png"):
             frames[4].read()
+        (folder / "depth.txt").write_text("\ufeff" + "\r\n".join([*lines, lines[-1], "12.0 depth/1.5.png"]), "utf-8")
+        assert_frames(framesOf(folder), depths())
+        for nothing in ("", "# depth maps\n"):
+            (folder / "depth.txt").write_text(nothing)
+            with pytest.raises(error, match="names no images"):
+                framesOf(folder)[0].read()
+        (folder / "depth.txt").write_bytes(b"\0" * 50)
+        with pytest.raises(error, match="no time and file"):
+            framesOf(folder)[0].read()
         (folder / "depth.txt").write_text("1 2 3\n")
         with pytest.raises(error, match="line 1 is '1 2 3'"):
             framesOf(folder)[0].read()
@@ -163,15 +245,15 @@ def written_bag(path, kind, messages):
     return path
 
 
-def header(types, first):
-    stamp = types["builtin_interfaces/msg/Time"](sec=1, nanosec=2)
+def header(types, first, second=1):
+    stamp = types["builtin_interfaces/msg/Time"](sec=second, nanosec=2)
     return types["std_msgs/msg/Header"](stamp=stamp, frame_id="camera", **({"seq": 0} if first else {}))
 
 
-def image_message(depth):
+def image_message(depth, second=1):
     encoding = {"uint16": "16UC1", "float32": "32FC1", "uint8": "mono8"}[depth.dtype.name]
     return lambda types, first: types["sensor_msgs/msg/Image"](
-        header=header(types, first),
+        header=header(types, first, second),
         height=depth.shape[0],
         width=depth.shape[1],
         encoding=encoding,
@@ -212,17 +294,18 @@ def cloud_message(cloud):
     return make
 
 
-def camera_message(distortion=D):
-    values = {"D": distortion, "K": K.ravel(), "R": np.eye(3).ravel(), "P": np.zeros(12)}
+def camera_message(distortion=D, factor=1, second=1, model="plumb_bob"):
+    scaled = K * [[factor], [factor], [1]]
+    values = {"D": distortion, "K": scaled.ravel(), "R": np.eye(3).ravel(), "P": np.zeros(12)}
 
     def make(types, first):
         own = values if first else {name.lower(): value for name, value in values.items()}
         region = types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
         return types["sensor_msgs/msg/CameraInfo"](
-            header=header(types, first),
+            header=header(types, first, second),
             height=30,
             width=40,
-            distortion_model="plumb_bob",
+            distortion_model=model,
             binning_x=0,
             binning_y=0,
             roi=region,
@@ -256,6 +339,37 @@ class TestBags:
         geometry = frames[0].read().geometry
         assert np.array_equal(geometry["K"], K)
         assert np.array_equal(geometry["distCoeffs"], D)
+
+    def test_a_camera_that_changes(self, kind, tmp_path):
+        """By stamps where these agree, however late a camera is recorded; else the last one before the image."""
+        images = [("/d/image", 100 * i, image_message(depth, i)) for i, depth in enumerate(depths(), 1)]
+        cameras = [(90, 1, 1), (205, 2, 2), (305, 7, 3)]
+        infos = [("/d/camera_info", time, camera_message(0 * D, factor, stamp)) for time, stamp, factor in cameras]
+        frames = framesOf(self.bag(kind, tmp_path, *sorted([*images, *infos], key=lambda message: message[1])))
+        factors = [frame.read().geometry["K"][0, 0] / K[0, 0] for frame in frames]
+        assert factors == [1, 2, 2, 3]
+        assert all("distCoeffs" not in frame.geometry for frame in frames)
+
+    def test_a_camera_that_cannot_be_used(self, kind, tmp_path):
+        bag = self.bag(
+            kind,
+            tmp_path,
+            ("/d/camera_info", 1, camera_message(model="equidistant")),
+            *[("/d/image", 2 + i, image_message(depth)) for i, depth in enumerate(depths())],
+        )
+        frames = framesOf(bag)
+        assert len(frames) == 4
+        with pytest.raises(error, match=r"the camera in '/d/camera_info' cannot be used: .* or give -K"):
+            frames[0].read()
+        assert {item.state for item in runBatch(bag, tmp_path / "out", form="png", K=K)} == {"written"}
+
+    def test_images_of_another_size_than_their_camera_says(self, kind, tmp_path):
+        bag = self.bag(
+            kind, tmp_path, ("/d/camera_info", 1, camera_message()), ("/d/i", 2, image_message(depths()[0][:20]))
+        )
+        (item,) = runBatch(bag, tmp_path / "out", form="png")
+        assert item.state == "failed"
+        assert "40 x 30" in item.message
 
     def test_results_equal_those_of_the_images(self, kind, tmp_path):
         bag = self.bag(
@@ -418,3 +532,12 @@ class TestMessages:
         assert camera_of(SimpleNamespace(k=np.zeros(9), d=[], p=P, distortion_model="")) == {}
         with pytest.raises(ValueError, match="rectify"):
             camera_of(SimpleNamespace(**{**vars(message), "distortion_model": "equidistant"}))
+
+    def test_images_that_are_cut_and_binned(self):
+        region = SimpleNamespace(x_offset=0, y_offset=0, width=0, height=0)
+        known = {"K": K.ravel(), "D": [], "width": 40, "height": 30, "roi": region, "binning_x": 0, "binning_y": 0}
+        assert camera_of(SimpleNamespace(**known))["imageSize"] == (40, 30)
+        cut = SimpleNamespace(x_offset=8, y_offset=4, width=20, height=18)
+        found = camera_of(SimpleNamespace(**{**known, "roi": cut, "binning_x": 2, "binning_y": 3}))
+        assert found["imageSize"] == (10, 6)
+        assert np.allclose(found["K"], [[25, 0, 5.75], [0, 50 / 3, 3.5], [0, 0, 1]])

@@ -131,6 +131,17 @@ class TestGrowing:
         one_region_each(labels, np.s_[:, :50], np.s_[:, 50:])
         assert not growRegions(STEP, markers, edges=edges, noise=SIGMA)[:, 50:].any()
 
+    @pytest.mark.parametrize(("width", "regions"), [(6, 2), (8, 2), (9, 2), (16, 3), (24, 3)])
+    def test_narrow_strip_goes_on_around_a_bend(self, width, regions):
+        row, col = np.mgrid[:80, :80].astype(float)
+        across = np.minimum(row - 10, 69 - col)  # from the outer side of an L
+        strip = (across >= 0) & (across < width) & (col >= 10) & (row < 70)
+        outline = strip & ~cv2.erode(strip.astype(np.uint8), np.ones((3, 3))).astype(bool)
+        height = noisy(np.where(strip, 50 + 4 * across, 0.0))
+        labels = segmentRegions(height, edges=outline, noise=SIGMA)
+        along_row, along_col = labels[10 + width // 2, 30], labels[50, 69 - width // 2]
+        assert len({labels[0, 0], along_row, along_col}) == regions
+
     def test_edges_on_a_smooth_surface_do_not_part_it(self):
         src = noisy(columns(0.2 * X))
         edges = np.zeros(src.shape, np.uint8)

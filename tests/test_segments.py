@@ -157,6 +157,20 @@ def test_noise_shows_in_the_deviations():
     assert medians[1] > 2 * medians[0]
 
 
+def test_deviations_of_jumps_are_those_of_lines_between_the_same_pixels():
+    errors, deviations = [], []
+    rows, cols = np.mgrid[:70, :90]
+    for slope, offset in np.random.default_rng(4).uniform((0.05, 0), (0.95, 1), (40, 2)):
+        depth = np.where(cols < 20 + offset + slope * rows, 1.0, 3.0)
+        (segment,) = fitSegments(linkEdges(depth, pixelSize=1, noise=1e-3)).segments
+        x, y, _ = segment["ends"].T
+        errors.append((x - (20 + offset + slope * y)) / np.hypot(1, slope))
+        deviations.append(segment["endDeviation"])
+    ratio = np.concatenate(errors).reshape(-1, 2) / np.array(deviations)[:, None]
+    assert 0.6 < np.sqrt(np.mean(ratio**2)) < 1.4
+    assert np.median(deviations) < 0.05  # a scan line alone is off by 0.29
+
+
 @pytest.mark.parametrize(
     ("call", "text"),
     [

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from .._check import boolean, described, error, fail, integer
@@ -107,9 +108,10 @@ def runBatch(
 
     A frame that cannot be processed does not stop the others. Of every frame ``manifest.jsonl`` (of a store, a file
     ``STORE.manifest.jsonl`` beside it) has one line: ``frame``, ``input``, ``part``, ``state``, ``outputs`` with their
-    sizes, ``parameters``, ``counts``, ``seconds``, and ``error`` where it failed. It is appended when all files of the
-    frame are complete. A run that was interrupted goes on where it stopped when it is started again: frames are done
-    whose line says so, with the same parameters, whose file has not been changed since, and whose outputs are there.
+    sizes, ``parameters``, ``counts``, ``seconds``, ``warnings`` where there are any, and ``error`` where it failed. It
+    is appended when all files of the frame are complete. A run that was interrupted goes on where it stopped when it is
+    started again: frames are done whose line says so, with the same parameters, whose file has not been changed since,
+    and whose outputs are there.
 
     Parameters
     ----------
@@ -190,6 +192,8 @@ def runBatch(
     options |= {} if mask is None else {"mask": mask}
     told = {} if calibration is None else {"calibration": calibration}
     job = _FrameJob(root, options, told, task, form)
+    if root.exists() and not root.is_dir():
+        raise error(f"cannot write to {str(root)!r}: it is a file, no folder", cv2.Error.StsError)
     path = root.with_name(f"{root.name}.{_MANIFEST}") if form == "zarr" else root / _MANIFEST
     if resume and not path.exists():
         raise error(f"there is no {str(path)!r} to resume from")

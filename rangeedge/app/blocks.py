@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
 
-from .._check import boolean, described, error, fail, integer
+from .._check import boolean, described, error, fail, integer, number
 from .._option import parsed, takes
-from ..distance import distanceTransform
+from ..distance import distanceTransform, salienceDistanceTransform
 from ..io import RangeImage
 from ..io.source import file_name
+from ..io.tiff import Window
 from ..noise import estimateNoise
 from ..options import DETECTION, MEASURED, Growing, ScanLineParams, Selection
 from ..recording import FrameSource
@@ -24,11 +25,13 @@ from ..recording.manifest import Manifest, read_lines
 from ..recording.source import extra
 from ..recording.stores import Outputs, open_arrays, packed, prepare_arrays, write_file, write_region
 from ..regions import segmentRegions
+from ..selection import overallStrength
 from .results import plain
 from .run import BatchItem, Job, run_frames
 from .tasks import TASKS, Counts
 
 _REACH = 4096  # pixels around a block in which the nearest edge is looked for
+_SALIENCE_REACH = 1024  # the same where weak edges count for less: distances by salience soon exceed any reach
 _STRIP = 32  # pixels across a seam in which labels of both sides are compared
 _PATCHES = 16  # of the image, of which the noise is estimated
 _PATCH = 512  # pixels
@@ -46,6 +49,8 @@ def runBlocks(
     client: Any = None,
     force: bool = False,
     resume: bool = False,
+    mask: np.ndarray | None = None,
+    jumpCut: float | None = None,
     **options: Any,
 ) -> Iterator[BatchItem]:
     """Find the edges or regions of an image that is larger than memory.
@@ -70,9 +75,12 @@ def runBlocks(
         In pixels.
     jobs, client, force, resume
         As for `runBatch`: a block is what a frame is there, and the manifests are beside the store.
+    mask : ndarray of shape (H, W), 8-bit or bool, optional
+        Non-zero where pixels are used. A mask and a map of the noise may be such as ``numpy.load(mmap_mode="r")``
+        returns: no more than a block of them is read at a time.
+    jumpCut : float, optional
+        With it, ``detect`` writes salience too: `salienceDistanceTransform` of `overallStrength` with that cut.
     {options}
-
-    A noise given as a map is refused, and so is `mask`.
 
     Returns
     -------
@@ -87,10 +95,11 @@ def runBlocks(
     Notes
     -----
     Distances are those of the whole image wherever they are less than 4096 pixels; of a pixel farther from every edge
-    than that, the distance to the nearest one that was seen, or inf. Scan lines are divided from end to end, and so
-    edges may differ where a block ends them earlier; components of edges and regions are cut off beyond the overlap.
-    Labels of two blocks become one where they share half of the smaller, in the 32 pixels beyond the seam that both
-    blocks have labelled.
+    than that, the distance to the nearest one that was seen, or inf. Salience distances are exact below 1024 pixels,
+    and beyond never too small; ``unsurePixels`` in the manifest counts those that may differ. Scan lines are divided
+    from end to end, and so edges may differ where a block ends them earlier; components of edges and regions are cut
+    off beyond the overlap. Labels of two blocks become one where they share half of the smaller, in the 32 pixels
+    beyond the seam that both blocks have labelled.
 
     Examples
     --------
@@ -113,20 +122,31 @@ def runBlocks(
     force, resume = boolean("force", force), boolean("resume", resume)
     for option in options.keys() - TASKS[task].options.keys():
         raise error(f"`{option}` is no option of {task!r}")
-    parsed(options, ScanLineParams, Selection, Growing)
-    if isinstance(options.get("noise"), np.ndarray):
-        raise fail("noise", "a number or a NoiseModel with blocks", described(options["noise"]))
     extra("zarr", "zarr", "an image in blocks")
     large = open_large(name)
+    if jumpCut is not None:
+        jumpCut = number("jumpCut", jumpCut, 0, above=True)
+        if task != "detect":
+            raise fail("jumpCut", f"None for {task!r}", described(jumpCut))
+    maps = {} if mask is None else {"mask": mask}
+    if isinstance(options.get("noise"), np.ndarray) and options["noise"].ndim:
+        maps["noise"] = options.pop("noise")
+    parsed(options, ScanLineParams, Selection, Growing)
+    for what, values in maps.items():
+        if not isinstance(values, np.ndarray) or values.shape != large.shape:
+            raise fail(what, f"an array of shape {large.shape}", described(values))
     first = _manifest(root, _PASSES[task][0])
     if resume and not first.exists():
         raise error(f"there is no {str(first)!r} to resume from")
     grid = Grid(large.shape, size)
-    items = _passes(task, large, grid, root, overlap, options, force, jobs=jobs, client=client)
-    return items if folder is None else _and_files(items, task, large, grid, root)
+    steps = _PASSES[task] if jumpCut is None else (*_PASSES[task], "salience")
+    items = _passes(steps, large, grid, root, overlap, options, maps, jumpCut, force, jobs=jobs, client=client)
+    return items if folder is None else _and_files(items, steps, large, grid, root)
 
 
-def _and_files(items: Iterator[BatchItem], task: str, image: LargeImage, grid: Grid, root: Path) -> Iterator[BatchItem]:
+def _and_files(
+    items: Iterator[BatchItem], steps: Sequence[str], image: LargeImage, grid: Grid, root: Path
+) -> Iterator[BatchItem]:
     """The blocks, and when all are done the arrays as files beside the store."""
     whole = True
     for item in items:
@@ -134,7 +154,7 @@ def _and_files(items: Iterator[BatchItem], task: str, image: LargeImage, grid: G
         yield item
     if whole:
         arrays = open_arrays(root, "r")
-        for name in (name for step in _PASSES[task] for name in _STEPS[step].kinds if name != "parts"):
+        for name in (name for step in steps for name in _STEPS[step].kinds if name != "parts"):
             path = root.with_name(f"{name}.tif")
             write_geotiff(path, arrays[name], image, grid.size)
             yield BatchItem(image.path, str(path), "written", "")
@@ -145,49 +165,68 @@ def _manifest(root: Path, step: str) -> Path:
 
 
 def _passes(
-    task: str,
+    steps: Sequence[str],
     image: LargeImage,
     grid: Grid,
     root: Path,
     overlap: int,
     options: dict[str, Any],
+    maps: Mapping[str, np.ndarray],
+    jumpCut: float | None,
     force: bool,
     **workers: Any,
 ) -> Iterator[BatchItem]:
-    """The two steps of a task; the second anew where the first has written anything."""
-    options = {**options, "noise": _noise(image, options)}
+    """The steps of a task; those after the first anew where one has written anything."""
+    if "noise" not in maps:
+        options = {**options, "noise": _noise(image, options, maps.get("mask"))}
     told: dict[str, Any] = {"blockSize": grid.size, "overlap": overlap}
-    sources = list(_sources(image, grid, overlap))
+    sources = list(_sources(image, grid, overlap, maps))
     known = {**image.geometry, **({} if image.georeference is None else {"georeference": image.georeference})}
-    for step in _PASSES[task]:
-        if step == "labels":
-            told |= _numbering(root, grid)
-        job, manifest = _STEPS[step](root, options, told, grid, known), Manifest(_manifest(root, step))
-        for item in run_frames(job, sources, manifest, force, **workers):
-            force |= item.state == "written"
+    again = force
+    for step in steps:
+        own = {"jumpCut": jumpCut} if step == "salience" else _numbering(root, grid) if step == "labels" else {}
+        job, manifest = _STEPS[step](root, options, told | own, grid, known), Manifest(_manifest(root, step))
+        for item in run_frames(job, sources, manifest, again, **workers):
+            force |= item.state == "written" and step == steps[0]
             yield item
+        again = force
 
 
-def _sources(image: LargeImage, grid: Grid, overlap: int) -> Iterator[FrameSource]:
+@dataclass(frozen=True)
+class _Block(FrameSource):
+    """A block with what overlaps it, and the same parts of maps that go with the image."""
+
+    maps: Mapping[str, np.ndarray] = field(default_factory=dict, repr=False)
+
+
+def _sources(image: LargeImage, grid: Grid, overlap: int, maps: Mapping[str, np.ndarray]) -> Iterator[FrameSource]:
     digits = len(str(max(image.shape)))
     for index in range(len(grid)):
         top, left, bottom, right = grid.window(index)
         name = f"{top:0{digits}d}_{left:0{digits}d}"
         part = f"rows {top} to {bottom}, columns {left} to {right}"
-        yield window_source(image, name, grid.window(index, overlap), part)
+        around = grid.window(index, overlap)
+        source = window_source(image, name, around, part)
+        parts = {what: inside(values, around, (0, 0)) for what, values in maps.items()}
+        yield _Block(name, source.path, part, source.load, source.geometry, maps=parts)
 
 
-def _noise(image: LargeImage, options: dict[str, Any]) -> Any:
+def _noise(image: LargeImage, options: dict[str, Any], mask: np.ndarray | None) -> Any:
     """The noise as given, or as patches tell that are spread over the image, with rows and columns of NaN between."""
     if options.get("noise") is not None:
         return options["noise"]
     size = min(_PATCH, *image.shape)
     side = int(np.sqrt(_PATCHES))
     tops, lefts = (np.unique(np.linspace(0, extent - size, side).astype(int)).tolist() for extent in image.shape)
-    rows = []
-    for top in tops:
-        row = [window_source(image, "", (top, left, top + size, left + size), "").read().src for left in lefts]
-        rows.append(np.hstack([np.pad(patch, 1, constant_values=_nothing(patch)) for patch in row]))
+
+    def patch(top: int, left: int) -> np.ndarray:
+        window = (top, left, top + size, left + size)
+        src = window_source(image, "", window, "").read().src
+        if mask is not None:
+            src[inside(mask, window, (0, 0)) == 0] = _nothing(src)
+        return np.pad(src, 1, constant_values=_nothing(src))
+
+    rows = [np.hstack([patch(top, left) for left in lefts]) for top in tops]
     known = {name: value for name, value in {**image.geometry, **options}.items() if name in MEASURED}
     return estimateNoise(np.vstack(rows), **known)
 
@@ -211,18 +250,25 @@ class _BlockJob(Job):
         prepare_arrays(self.out, arrays, fresh)
         open_arrays(self.out).attrs.update(plain(self.map))
 
+    def parameters(self, frame: FrameSource) -> dict[str, Any]:
+        return {**super().parameters(frame), **plain(_maps_of(frame))}
+
     def write(self, index: int, arrays: dict[str, np.ndarray]) -> Outputs:
         return write_region(self.out, arrays, self.grid.window(index), self.grid.place(index))
 
     def image(self, source: FrameSource, around: tuple[int, ...]) -> tuple[np.ndarray, dict[str, Any]]:
         """A block with what overlaps it, and its geometry."""
-        src, geometry = source.read(**self.options)
+        src, geometry = source.read(**self.options, **_maps_of(source))
         if geometry.get("K") is not None:
             camera = ScanLineParams(K=geometry["K"], distCoeffs=geometry.get("distCoeffs"))
             K = np.array(camera.K)
             K[:2, 2] -= around[1], around[0]
             geometry |= {"K": K, "distCoeffs": camera.distCoeffs}
         return src, geometry
+
+
+def _maps_of(source: FrameSource) -> Mapping[str, np.ndarray]:
+    return source.maps if isinstance(source, _Block) else {}
 
 
 class _Edges(_BlockJob):
@@ -239,21 +285,38 @@ class _Edges(_BlockJob):
 
 class _Distances(_BlockJob):
     kinds: ClassVar[Mapping[str, str]] = {"distance": "f4"}
+    reach: ClassVar[int] = _REACH
+
+    def seen(self, arrays: Any, around: Window) -> np.ndarray:
+        """The distances of a window, to edges in that window."""
+        top, left, bottom, right = around
+        return distanceTransform(arrays["edges"][top:bottom, left:right])
 
     def __call__(self, task: tuple[int, FrameSource]) -> tuple[Outputs, Counts]:
         """With as much around the block as it takes to know that no edge beyond is nearer."""
         index, _ = task
-        edges = open_arrays(self.out)["edges"]
+        (name,) = self.kinds
         window, margin = self.grid.window(index), self.told["overlap"]
         while True:
             around = self.grid.window(index, margin)
-            top, left, bottom, right = around
-            distance = inside(distanceTransform(edges[top:bottom, left:right]), window, around)
+            distance = inside(self.seen(open_arrays(self.out), around), window, around)
             unsure = distance > clearance(window, around, self.grid.shape)
-            if not unsure.any() or margin >= _REACH:
-                return self.write(index, {"distance": distance}), {"unsurePixels": int(np.count_nonzero(unsure))}
+            if not unsure.any() or margin >= self.reach:
+                return self.write(index, {name: distance}), {"unsurePixels": int(np.count_nonzero(unsure))}
             farthest = distance[unsure].max()
-            margin = min(_REACH, int(np.ceil(farthest)) if np.isfinite(farthest) else 2 * margin + 64)
+            margin = min(self.reach, int(np.ceil(farthest)) if np.isfinite(farthest) else 2 * margin + 64)
+
+
+class _Saliences(_Distances):
+    """A salience is at most 1, and so no edge is nearer by it than it is."""
+
+    kinds: ClassVar[Mapping[str, str]] = {"salience": "f4"}
+    reach: ClassVar[int] = _SALIENCE_REACH
+
+    def seen(self, arrays: Any, around: Window) -> np.ndarray:
+        top, left, bottom, right = around
+        jump, crease = (arrays[name][top:bottom, left:right] for name in ("jump", "crease"))
+        return salienceDistanceTransform(overallStrength(jump, crease, self.told["jumpCut"]))
 
 
 class _Parts(_BlockJob):
@@ -293,7 +356,13 @@ class _Labels(_BlockJob):
 
 # The steps of a task, the second of which needs the whole of the first.
 _PASSES = {"detect": ("edges", "distance"), "segment": ("parts", "labels")}
-_STEPS: dict[str, type[_BlockJob]] = {"edges": _Edges, "distance": _Distances, "parts": _Parts, "labels": _Labels}
+_STEPS: dict[str, type[_BlockJob]] = {
+    "edges": _Edges,
+    "distance": _Distances,
+    "salience": _Saliences,
+    "parts": _Parts,
+    "labels": _Labels,
+}
 
 
 def _strips(root: Path, index: int) -> str:

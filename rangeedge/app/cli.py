@@ -366,7 +366,7 @@ def _explain(args: argparse.Namespace) -> int:
 
 
 def _batch(args: argparse.Namespace) -> int:
-    return run_batch(args, _options(args))
+    return run_batch(args, _options(args), _flag)
 
 
 def _demo(args: argparse.Namespace) -> int:

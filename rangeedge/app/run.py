@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import os
 import re
 import shutil
@@ -16,6 +17,7 @@ from .. import __version__
 from .._check import error
 from ..frames import outcomes_of
 from ..io import RangeImage
+from ..plausible import collected
 from ..recording import FrameSource
 from ..recording.manifest import Line, Manifest, changed, complete
 from .results import plain
@@ -31,6 +33,7 @@ class BatchItem(NamedTuple):
     folder: str
     state: str  # "written", "skipped" or "failed"
     message: str  # of the error, or empty
+    warnings: tuple[str, ...] = ()  # of a frame that was written
 
 
 @dataclass(frozen=True)
@@ -75,10 +78,18 @@ class Job:
         )
 
 
+def _warned(job: Job, task: tuple[int, FrameSource]) -> tuple[dict[str, int], Counts, tuple[str, ...]]:
+    """A frame, with what there is to be warned of."""
+    with collected() as warnings:
+        outputs, counts = job(task)
+    return outputs, counts, tuple(dict.fromkeys(warnings))
+
+
 def run_frames(
     job: Job, frames: list[FrameSource], manifest: Manifest, force: bool, **workers: Any
 ) -> Iterator[BatchItem]:
     """What becomes of each frame, in their order, each when it and those before it are done."""
+    _expect_apart(job, frames)
     with manifest.opened():
         _sweep(job.out)
         done = set() if force else {f.name for i, f in enumerate(frames) if job.is_done(i, f, manifest.lines)}
@@ -86,14 +97,14 @@ def run_frames(
         job.prepare(frames, fresh=not done)
         pending = [(index, frame) for index, frame in enumerate(frames) if frame.name not in done]
         modified = {frame.path: changed(frame.path) for _, frame in pending}
-        outcomes = outcomes_of(job, pending, **workers)
+        outcomes = outcomes_of(functools.partial(_warned, job), pending, **workers)
         for index, frame in enumerate(frames):
             where = str(job.place(frame))
             if frame.name in done:
                 yield BatchItem(frame.title, where, "skipped", "")
                 continue
             outcome = next(outcomes)
-            outputs, counts = outcome.value or ({}, {})
+            outputs, counts, warnings = outcome.value or ({}, {}, ())
             line: Line = {
                 "frame": frame.name,
                 "input": frame.path,
@@ -107,10 +118,20 @@ def run_frames(
                 "modified": modified[frame.path],
                 "rangeedge": __version__,
             }
-            manifest.append(line | {"error": outcome.error} if outcome.error else line)
-            yield BatchItem(frame.title, where, line["state"], outcome.error)
+            said = {"error": outcome.error, "warnings": list(warnings)}
+            manifest.append(line | {name: value for name, value in said.items() if value})
+            yield BatchItem(frame.title, where, line["state"], outcome.error, warnings)
             if outcome.full:
                 raise error(f"nothing more can be written to {str(job.out)!r}; make room, and run it again")
+
+
+def _expect_apart(job: Job, frames: list[FrameSource]) -> None:
+    """Refuse to write over what is read."""
+    inputs = {os.path.realpath(frame.path): frame.path for frame in frames}
+    for frame in frames:
+        place = os.path.realpath(job.place(frame))
+        if place in inputs:
+            raise error(f"results would replace the input {inputs[place]!r}; give another `out`")
 
 
 def _sweep(out: Path) -> None:

@@ -89,6 +89,11 @@ def in_flags(text: str, flag: Callable[[str], str]) -> str:
     return re.sub(r"(--[a-z-]+)=(True|False)", lambda word: word[1] if word[2] == "True" else f"no {word[1]}", text)
 
 
+def warning_in_flags(text: str, flag: Callable[[str], str]) -> str:
+    """The text of a warning in the words of the command line."""
+    return in_flags(text.replace("invalid=()", "invalid=none"), flag)
+
+
 @contextmanager
 def told_warnings(flag: Callable[[str], str]) -> Iterator[None]:
     """Warnings of the package as lines of the command line, in whose words `flag` names the options."""
@@ -98,8 +103,7 @@ def told_warnings(flag: Callable[[str], str]) -> Iterator[None]:
         def tell(message: Warning | str, category: type[Warning], *where: Any) -> None:
             if not issubclass(category, RangeEdgeWarning):
                 return other(message, category, *where)
-            text = str(message).replace("invalid=()", "invalid=none")
-            print(f"rangeedge: warning: {in_flags(text, flag)}", file=sys.stderr)
+            print(f"rangeedge: warning: {warning_in_flags(str(message), flag)}", file=sys.stderr)
 
         warnings.showwarning = tell  # type: ignore[assignment]
         yield

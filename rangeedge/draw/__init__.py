@@ -4,12 +4,13 @@ from .boundaries import drawBoundaries
 from .distance import colorizeDistance
 from .edges import drawEdges
 from .explanation import drawExplanation
-from .lines import drawChains, drawSegments
-from .overview import drawOverview, drawPanels, region_overview
+from .lines import drawArcs, drawChains, drawSegments
+from .overview import drawOverview, drawPanels, line_overview, region_overview
 from .regions import drawRegions
 
 __all__ = [
     "colorizeDistance",
+    "drawArcs",
     "drawBoundaries",
     "drawChains",
     "drawEdges",
@@ -18,5 +19,6 @@ __all__ = [
     "drawPanels",
     "drawRegions",
     "drawSegments",
+    "line_overview",
     "region_overview",
 ]

@@ -33,6 +33,12 @@ _CAPTIONS = {
     "regions": "surfaces, a colour each",
     "chains": "edges linked into lines, a colour each",
 }
+_GEOMETRY = {
+    "K": "camera: fx, fy, cx, cy [pixels]",
+    "pixelSize": "or pixel size",
+    "depthFactor": "depth factor",
+    "invalid": "no data",
+}
 _GROUPS = {"Which edges count": SELECTION, "How scan lines are cut": DETECTION.keys() - SELECTION.keys()}
 _LARGEST_UPLOAD = 200_000_000  # bytes
 _ENCODING = (cv2.IMWRITE_JPEG_QUALITY, 95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
@@ -112,7 +118,7 @@ class _Page:
                     sanitize=False,
                 )
             ui.space()
-            ui.label("click a pixel: why?   wheel: zoom   double click: all").classes("text-grey-7")
+            ui.label("click: why? · wheel: zoom · double click: whole image").classes("text-grey-7")
             with ui.button("views", icon="grid_view").props("dense flat no-caps id=views"), ui.menu():
                 self.choice = {name: self._view_switch(name) for name in VIEWS}
         self.grid = ui.element("div").classes("w-full views")
@@ -122,7 +128,7 @@ class _Page:
 
     def _view_switch(self, name: str) -> ui.checkbox:
         box = ui.checkbox(f"{name}: {_CAPTIONS[name]}", value=name in _FIRST, on_change=lambda: self._lay_out())
-        return box.props("dense").classes("q-px-md q-py-xs w-full")
+        return box.props("dense").classes("q-px-md q-py-xs").style("width: 400px")
 
     def _controls(self) -> None:
         session = self.session
@@ -131,16 +137,15 @@ class _Page:
             label="drop a range image here", auto_upload=True, max_file_size=_LARGEST_UPLOAD, on_upload=self._uploaded,
             on_rejected=lambda: self._complain("the file is larger than 200 MB"),
         ).props("flat bordered").classes("w-full")  # fmt: skip
-        K = session.geometry.get("K")
-        camera = "" if K is None else ", ".join(f"{v:g}" for v in np.asarray(K).ravel()[[0, 4, 2, 5]])
-        self.camera = ui.input("camera: fx, fy, cx, cy [pixels]", value=camera).props("dense").classes("w-full")
-        size = session.geometry.get("pixelSize")
-        self.size = ui.input("or pixel size of a grid", value="" if size is None else str(size))
-        self.size.props("dense").classes("w-full")
+        self.geometry = {}
+        with ui.element("div").classes("w-full grid grid-cols-3 gap-2"):
+            for name, label in _GEOMETRY.items():
+                field = ui.input(label).props(f"dense id={name}").classes("col-span-3" if name == "K" else "")
+                self.geometry[name] = field.tooltip(_explained(name))
         with ui.row().classes("w-full items-center justify-between"):
-            self.height = ui.checkbox("larger is nearer", value=bool(session.geometry.get("heightMap")))
-            self.height.props("dense")
+            self.height = ui.checkbox("larger is nearer").props("dense")
             ui.button("apply", on_click=self._placed).props("dense flat no-caps id=apply")
+        self._show_geometry()
         self.controls: dict[str, Any] = {}
         for heading, names in _GROUPS.items():
             _heading(heading)
@@ -155,6 +160,11 @@ class _Page:
             ui.button("detector.yml", icon="download", on_click=self._download).props("dense flat no-caps id=download")
             ui.button("defaults", icon="restart_alt", on_click=self._defaults).props("dense flat no-caps id=defaults")
         self.program = ui.code("", language="python").classes("w-full text-caption").props("id=program")
+
+    def _show_geometry(self) -> None:
+        for name, field in self.geometry.items():
+            field.value = self.session.typed(name)
+        self.height.value = bool(self.session.geometry.get("heightMap"))
 
     def _slider(self, name: str) -> None:
         low, high, step = SLIDERS[name]
@@ -205,7 +215,7 @@ class _Page:
                 self.program.content = self.session.python()
                 await run.io_bound(lambda r=results: r.edges)
                 await asyncio.gather(*(self._show(results, views, group) for group in SHARING))
-                if not self.cancellation.cancelled:
+                if not self.cancellation.cancelled and not self.status.is_deleted:
                     took, edges = 1000 * (time.perf_counter() - start), np.count_nonzero(results.edges)
                     self.status.text = f"{width} x {height}, {edges} edge pixels, {len(views)} views in {took:.0f} ms"
         except error as problem:
@@ -217,7 +227,7 @@ class _Page:
         """Those of a group of views that are shown, each as soon as it is drawn."""
         for name in (name for name in group if name in views):
             picture = await run.io_bound(self._picture, name, results)
-            if picture is None:
+            if picture is None or views[name].is_deleted:  # other views were chosen, or the page was closed
                 return
             views[name].set_source(picture)
             if self.pending:
@@ -256,7 +266,8 @@ class _Page:
 
     def _placed(self) -> None:
         try:
-            self.session.place(self.camera.value, self.size.value, height_map=self.height.value)
+            camera, size, factor, invalid = (field.value or "" for field in self.geometry.values())
+            self.session.place(camera, size, height_map=self.height.value, depth_factor=factor, invalid=invalid)
         except error as problem:
             self._complain(problem.err)
             return
@@ -272,6 +283,7 @@ class _Page:
             self._complain(f"{event.file.name}: {problem.err}")
             return
         self.problem.text = ""
+        self._show_geometry()
         self._ask()
 
     async def _asked(self, event: events.MouseEventArguments) -> None:
@@ -306,8 +318,7 @@ def _heading(text: str) -> None:
 def _explained(name: str) -> str:
     """What a parameter means, for those who point at it."""
     option = DETECTION[name]
-    text = option.text.replace("`", "") + (f" [{option.unit}]" if option.unit else "")
-    return text
+    return option.text.replace("`", "") + (f" [{option.unit}]" if option.unit else "")
 
 
 def _encoded(picture: np.ndarray) -> str:

@@ -93,23 +93,28 @@ class Session:
             self.use(image if image.geometry else image.withGeometry(**known) if _fits(image, self.image) else image)
         self.title = name
 
-    def place(self, camera: str, pixel_size: str, *, height_map: bool) -> None:
-        """Take a geometry as it is typed; on an error it stays as it was."""
-        given: dict[str, Any] = {}
-        if camera.strip():
-            given["K"] = _numbers(camera)
-        elif pixel_size.strip():
-            sizes = _numbers(pixel_size)
-            given["pixelSize"] = sizes[0] if len(sizes) == 1 else sizes
-        if height_map:
-            given["heightMap"] = True
-        kept = {n: v for n, v in self.image.geometry.items() if n in ("depthFactor", "invalid")}
-        self.use(RangeImage(self.image.src, {**kept, **given}))
+    def place(
+        self, camera: str, pixel_size: str, *, height_map: bool, depth_factor: str = "", invalid: str = ""
+    ) -> None:
+        """Take a geometry as it is typed, in the words of the command line; on an error it stays as it was."""
+        texts = {"K": camera, "pixelSize": "" if camera.strip() else pixel_size}
+        texts |= {"depthFactor": depth_factor, "invalid": invalid}
+        given = {name: _read(name, text) for name, text in texts.items() if text.strip()}
+        self.use(RangeImage(self.image.src, given | ({"heightMap": True} if height_map else {})))
+
+    def typed(self, name: str) -> str:
+        """An option of the geometry as it would be typed."""
+        value = self.geometry.get(name)
+        if value is None:
+            return ""
+        numbers = np.asarray(value, np.float64).ravel()
+        if name == "K" and numbers.size == 9:
+            numbers = numbers[[0, 4, 2, 5]]
+        return ", ".join(f"{number:g}" for number in numbers) or "none"  # invalid=()
 
     def change(self, name: str, value: Any) -> None:
         """Set a parameter."""
-        default = DETECTION[name].default
-        if value == default or (name == "jumpThreshold" and not value):
+        if value is None or value == self._usual(name):
             self.options.pop(name, None)
         else:
             self.options[name] = value
@@ -126,10 +131,14 @@ class Session:
 
     def value(self, name: str) -> Any:
         """What a parameter is."""
-        value = self.options.get(name, DETECTION[name].default)
-        if value is None and name == "lineSignificance":
-            return Selection().of(self._results.params).lineSignificance
-        return 0.0 if value is None else value
+        return self.options.get(name, self._usual(name))
+
+    def _usual(self, name: str) -> Any:
+        """What it is by default, None in numbers."""
+        default = DETECTION[name].default
+        if default is not None:
+            return default
+        return Selection().of(self.results.params).lineSignificance if name == "lineSignificance" else 0.0
 
     def picture(self, view: str, results: Results | None = None) -> np.ndarray:
         """One of `VIEWS`, as large as the image."""
@@ -181,7 +190,7 @@ class Results:
 
     @cached_property
     def edges(self) -> np.ndarray:
-        return thin_lines(self.frame, selected(self.frame, self.strength, self.selection))
+        return thin_lines(self.frame, selected(self.frame, self.strength, self.selection.of(self.params)))
 
     @cached_property
     def distance(self) -> np.ndarray:
@@ -227,11 +236,11 @@ SHARING = (  # views whose results follow from each other, in the order in which
 )
 
 
-def _numbers(text: str) -> list[float]:
+def _read(name: str, text: str) -> Any:
     try:
-        return [float(word) for word in text.replace(",", " ").split()]
-    except ValueError:
-        raise error(f"must be numbers, got {text!r}") from None
+        return GEOMETRY[name].read(text.strip())
+    except ValueError as problem:
+        raise error(f"`{name}` {getattr(problem, 'err', problem)}") from None
 
 
 def _fits(image: RangeImage, other: RangeImage) -> bool:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Callable, Collection
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 import numpy as np
 
@@ -19,16 +19,22 @@ _GEOMETRY_BYTES = 4096  # more than any geometry takes
 def read_npy(data: bytes) -> np.ndarray:
     """The array, by NumPy's reader of the header; object arrays, which would be unpickled, are refused."""
     stream = io.BytesIO(data)
-    headers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
-    version = np.lib.format.read_magic(stream)
-    if version not in headers:
-        raise ValueError(f"NPY version {version} holds no range image")
-    shape, fortran, dtype = headers[version](stream)
-    if dtype.hasobject or min(shape, default=1) < 0:
-        raise ValueError(f"an array of shape {shape} of {dtype} is no range image")
+    shape, fortran, dtype = read_header(stream)
     expect_size(len(data) - stream.tell(), int(np.prod(shape, dtype=object)) * dtype.itemsize)
     array = np.frombuffer(data, dtype, offset=stream.tell()).reshape(shape, order="F" if fortran else "C")
     return array if dtype.names is None else _points_of_records(array)
+
+
+def read_header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
+    """Shape, order (whether that of Fortran) and type of the array that follows."""
+    headers = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+    version = np.lib.format.read_magic(stream)  # type: ignore[arg-type]
+    if version not in headers:
+        raise ValueError(f"NPY version {version} holds no range image")
+    shape, fortran, dtype = headers[version](stream)  # type: ignore[arg-type]
+    if dtype.hasobject or min(shape, default=1) < 0:
+        raise ValueError(f"an array of shape {shape} of {dtype} is no range image")
+    return shape, fortran, dtype
 
 
 def _points_of_records(records: np.ndarray) -> np.ndarray:
@@ -48,20 +54,18 @@ def write_npy(src: np.ndarray) -> bytes:
 
 
 def read_npz(data: bytes) -> RangeImage:
-    return read_archive(io.BytesIO(data), len(data), FILE_LIMIT)
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        member, geometry = source_of(archive, len(data))
+        return RangeImage(_member(archive, member, FILE_LIMIT), geometry)
 
 
-def read_archive(stream: BinaryIO, size: int, limit: int) -> RangeImage:
-    """The array of at most `limit` bytes of an NPZ file, and the geometry beside it."""
-    with zipfile.ZipFile(stream) as archive:
-        members = _members(archive)
-        geometry = {key: members.pop(key) for key in _GEOMETRY if key in members}
-        src = members[source_name(members)]
-        expect_unpacked(src.file_size, size)
-        return RangeImage(
-            _member(archive, src, limit),
-            {key: _GEOMETRY[key](_member(archive, member, _GEOMETRY_BYTES)) for key, member in geometry.items()},
-        )
+def source_of(archive: zipfile.ZipFile, size: int) -> tuple[zipfile.ZipInfo, dict[str, Any]]:
+    """Which member of an NPZ file of `size` bytes is the range image, and the geometry beside it."""
+    members = _members(archive)
+    geometry = {key: members.pop(key) for key in _GEOMETRY if key in members}
+    src = members[source_name(members)]
+    expect_unpacked(src.file_size, size)
+    return src, {key: _GEOMETRY[key](_member(archive, member, _GEOMETRY_BYTES)) for key, member in geometry.items()}
 
 
 def source_name(names: Collection[str]) -> str:

@@ -14,7 +14,7 @@ from xml.sax.saxutils import quoteattr
 import cv2
 import numpy as np
 
-from .._check import error
+from .._check import error, fail
 from .polylines import REGION, Line, grouped, no_pixels
 
 _APP = "RANGEEDGE"  # whose extended data DXF entities carry
@@ -70,6 +70,8 @@ def read_dxf(data: bytes) -> list[Line]:
 
 
 def write_svg(lines: list[Line], picture: np.ndarray | None = None) -> bytes:
+    if any(len(line.pixels) and not np.isfinite(line.pixels).any() for line in lines):
+        raise fail("lines", "lines with pixels for .svg", "some of which only points in space are known")
     if picture is None:
         places = np.concatenate([np.zeros((1, 2)), *(line.pixels for line in lines)])
         width, height = (int(size) for size in np.ceil(np.nanmax(places, axis=0) + 1))

@@ -46,7 +46,7 @@ def writeLines(
     epsg: int | None = None,
     picture: np.ndarray | None = None,
 ) -> None:
-    """Write chains, segments or outlines to a file.
+    """Write chains, segments, arcs or outlines to a file.
 
     writeLines(filename, lines[, transform], *[, epsg[, picture]]) -> None
 
@@ -58,15 +58,16 @@ def writeLines(
     - ``.obj``: a polyline each;
     - ``.geojson``: a LineString each, of an outline a Polygon with its holes, in the order x, y, z, with properties;
     - ``.dxf``: a polyline in space each, on layers by kind (needs the extra ``dxf``);
-    - ``.svg``: a path each, an outline and its holes together, in pixels, over a picture where one is given.
+    - ``.svg``: a path each, an outline and its holes together, in pixels, over a picture where one is given; not for
+      arcs, of which no pixels are known.
 
     Either the whole file is written or nothing.
 
     Parameters
     ----------
     filename : str or path
-    lines : EdgeChains, sequence of EdgeChain, Segments, its array of segments, RegionBoundaries, or sequence of Line
-        From `linkEdges`, `fitSegments`, `regionBoundaries`, `toLines` or `readLines`.
+    lines : EdgeChains, sequence of EdgeChain, Segments, array of segments or arcs, RegionBoundaries, sequence of Line
+        From `linkEdges`, `fitSegments`, `fitArcs`, `regionBoundaries`, `toLines` or `readLines`.
     transform : (2, 3) array or six floats, optional
         Only for GeoJSON: map coordinates x, y = transform @ (u, v, 1) of pixels, as `RangeImage.georeference`; or x0,
         dx, rx, y0, ry, dy as GDAL has them, with which pixel (u, v) lies at x0 + (u + 0.5) dx + (v + 0.5) rx and

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._check import described, fail, public
+from ..arcs import ARC, arc_points
 from ..boundaries import RegionBoundaries
 from ..chains import EdgeChain
 from ..edges import kindNames
@@ -31,7 +32,8 @@ class Line(NamedTuple):
         The same in space.
     properties : dict
         Numbers, booleans, and lists of them: of a chain jump, crease, significance and length; of a segment jump,
-        dihedral, length, rms, endDeviation, directionDeviation and vertices; of a ring label, region, hole and area.
+        dihedral, length, rms, endDeviation, directionDeviation and vertices; of an arc center, normal, radius, angle
+        and more that `fitArcs` tells, while its pixels are not known; of a ring label, region, hole and area.
     """
 
     kind: str
@@ -49,14 +51,14 @@ class Line(NamedTuple):
 
 @public
 def toLines(lines: Any) -> list[Line]:
-    """Turn chains, segments or outlines into plain polylines.
+    """Turn chains, segments, arcs or outlines into plain polylines.
 
     toLines(lines) -> polylines
 
     Parameters
     ----------
-    lines : EdgeChains, sequence of EdgeChain, Segments, its array of segments, RegionBoundaries, or sequence of Line
-        From `linkEdges`, `fitSegments`, `regionBoundaries` or `readLines`.
+    lines : EdgeChains, sequence of EdgeChain, Segments, array of segments or arcs, RegionBoundaries, sequence of Line
+        From `linkEdges`, `fitSegments`, `fitArcs`, `regionBoundaries` or `readLines`.
 
     Returns
     -------
@@ -84,11 +86,15 @@ def toLines(lines: Any) -> list[Line]:
         return list(_of_rings(lines))
     if isinstance(lines, np.ndarray) and lines.dtype == SEGMENT:
         return list(_of_segments(lines))
+    if isinstance(lines, np.ndarray) and lines.dtype == ARC:
+        return list(_of_arcs(lines))
     if isinstance(lines, Sequence) and all(isinstance(line, EdgeChain) for line in lines):
         return list(_of_chains(lines))
     if isinstance(lines, Sequence) and all(isinstance(line, Line) for line in lines):
         return list(lines)
-    raise fail("lines", "EdgeChains, Segments, RegionBoundaries, or a sequence of EdgeChain or Line", described(lines))
+    raise fail(
+        "lines", "EdgeChains, Segments, arcs, RegionBoundaries, or a sequence of EdgeChain or Line", described(lines)
+    )
 
 
 def _of_chains(chains: Sequence[EdgeChain]) -> Iterator[Line]:
@@ -105,6 +111,15 @@ def _of_segments(segments: np.ndarray) -> Iterator[Line]:
         known: dict[str, Any] = {name: float(segment[name]) for name in names}
         known["vertices"] = segment["vertices"].tolist()
         yield Line(kindNames(int(segment["kind"])), False, segment["pixels"].copy(), segment["ends"].copy(), known)
+
+
+def _of_arcs(arcs: np.ndarray) -> Iterator[Line]:
+    for arc in arcs:
+        names = ("radius", "angle", "jump", "crease", "rms", "centerDeviation", "normalDeviation", "radiusDeviation")
+        known: dict[str, Any] = {name: float(arc[name]) for name in names}
+        known.update(center=arc["center"].tolist(), normal=arc["normal"].tolist())
+        points = arc_points(arc)
+        yield Line(kindNames(int(arc["kind"])), bool(arc["angle"] >= 360), no_pixels(points), points, known)
 
 
 def _of_rings(boundaries: RegionBoundaries) -> Iterator[Line]:

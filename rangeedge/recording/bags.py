@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import contextlib
 import functools
+import threading
 import weakref
 from collections.abc import Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 from .._check import error
 from ..io import RangeImage
-from .messages import CAMERA, CLOUD, COMPRESSED, IMAGE, camera_of, range_image_of
-from .source import FrameSource, Unreadable, extra, kept
+from .bag_cameras import camera_name, cameras_of
+from .messages import CLOUD, COMPRESSED, IMAGE, range_image_of
+from .source import FrameSource, Unreadable, extra, failures_named, kept
 
 
 def is_bag(path: Path) -> bool:
@@ -36,46 +38,39 @@ def bag_frames(path: str, topics: tuple[str, ...] = ()) -> list[FrameSource]:
             have = ", ".join(sorted({c.topic for c in found})) or "none"
             wanted = f"no topic {', '.join(sorted(missing))}" if missing else "no depth images or organized clouds"
             raise error(f"{path!r} has {wanted}; topics of images and clouds: {have}")
-        cameras = {c.topic: _camera(reader, c.topic) for c in chosen if c.msgtype != CLOUD}
+        cameras = {c.topic: cameras_of(reader, c.topic) for c in chosen if c.msgtype != CLOUD}
         seen: dict[tuple[str, int], int] = {}
         frames: list[FrameSource] = []
-        for connection, time in _listed(path, reader, chosen, frames):
+        for connection, time, data in _listed(path, reader, chosen, frames):
             topic = connection.topic
             repeat = seen[topic, time] = seen.get((topic, time), -1) + 1
             mark = f"{time}_{repeat}" if repeat else f"{time}"
             name = f"{Path(path).stem}/{topic.strip('/')}/{mark}"
             load = functools.partial(_frame, path, topic, time, repeat)
-            frames.append(FrameSource(name, path, f"{topic} at {mark}", load, cameras.get(topic, {})))
+            source = FrameSource(name, path, f"{topic} at {mark}", load)
+            frames.append(cameras[topic].seen_by(source, connection, time, data) if topic in cameras else source)
         return frames
 
 
-def _listed(path: str, reader: Any, chosen: list[Any], frames: list[FrameSource]) -> Iterator[tuple[Any, int]]:
-    """Topic and time of every message; where the bag ends before its end, a frame that says so comes last."""
+def _listed(path: str, reader: Any, chosen: list[Any], frames: list[FrameSource]) -> Iterator[tuple[Any, int, bytes]]:
+    """Topic, time and content of every message; where the bag ends before its end, a frame that says so comes last."""
     try:
         with _failures_named(path):
-            for connection, time, _ in reader.messages(chosen):
-                yield connection, time
+            yield from reader.messages(chosen)
     except error as problem:
         frames.append(FrameSource(f"{Path(path).stem}/end", path, "the end", Unreadable(problem.err)))
 
 
-@contextlib.contextmanager
-def _failures_named(path: str) -> Iterator[None]:
-    """Whatever goes wrong in a bag is an error that names it: its readers raise many types on garbled files."""
-    try:
-        yield
-    except error:
-        raise
-    except Exception as reason:
-        hint = "; run `rosbag reindex`" if "index" in str(reason).lower() else ""
-        raise error(f"cannot read {path!r}: {type(reason).__name__}: {reason}{hint}") from reason
+def _failures_named(path: str) -> AbstractContextManager[None]:
+    return failures_named(repr(path), lambda reason: "; run `rosbag reindex`" if "index" in str(reason).lower() else "")
 
 
 class _Bag:
-    """An open bag, which is closed when nobody holds it any more."""
+    """An open bag, which is closed when nobody holds it any more; its readers seek, and so threads take turns."""
 
     def __init__(self, reader: Any) -> None:
         self.reader = reader
+        self.turn = threading.Lock()
         weakref.finalize(self, reader.close)
 
 
@@ -98,8 +93,8 @@ def _depths(reader: Any, connections: list[Any]) -> list[Any]:
     usable.sort(key=lambda c: (_FORMS.index(c.msgtype), c.topic))
     best: dict[str, Any] = {}
     for connection in usable:
-        best.setdefault(_camera_name(connection.topic), connection)
-    return [c for c in usable if best[_camera_name(c.topic)].topic == c.topic]
+        best.setdefault(camera_name(connection.topic), connection)
+    return [c for c in usable if best[camera_name(c.topic)].topic == c.topic]
 
 
 def _is_depth(message: Any) -> bool:
@@ -117,28 +112,13 @@ _LOOKED_AT = range(3)  # first messages of a topic, one of which may be garbled
 _FORMS = (IMAGE, COMPRESSED, CLOUD)
 
 
-def _camera_name(topic: str) -> str:
-    """The namespace of a camera: `/camera/depth` of `/camera/depth/image_raw/compressedDepth`."""
-    parts = topic.removesuffix("/compressedDepth").split("/")
-    return "/".join(parts[:-1])
-
-
-def _camera(reader: Any, topic: str) -> dict[str, Any]:
-    """The camera of the first CameraInfo beside a topic; empty where there is none."""
-    wanted = f"{_camera_name(topic)}/camera_info"
-    connections = [c for c in reader.connections if c.msgtype == CAMERA and c.topic == wanted]
-    first = next(reader.messages(connections), None) if connections else None
-    if first is None:
-        return {}
-    return camera_of(reader.deserialize(first[2], CAMERA), rectified="rect" in topic.removeprefix(_camera_name(topic)))
-
-
 def _frame(path: str, topic: str, time: int, repeat: int) -> RangeImage:
     """The message of a topic at a time, or that many after it at the same time."""
     with _failures_named(path):
         bag = _opened(path)
         reader = bag.reader
         chosen = [c for c in reader.connections if c.topic == topic]
-        messages = reader.messages(chosen, start=time, stop=time + 1)
-        connection, _, data = [message for _, message in zip(range(repeat + 1), messages, strict=False)][repeat]
+        with bag.turn:
+            messages = reader.messages(chosen, start=time, stop=time + 1)
+            connection, _, data = [message for _, message in zip(range(repeat + 1), messages, strict=False)][repeat]
         return range_image_of(reader.deserialize(data, connection.msgtype))

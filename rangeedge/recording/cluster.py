@@ -39,7 +39,9 @@ def connect(address: str, jobs: int) -> Any:
             return distributed.Client(scheduler_file=address)
         return distributed.Client(address, timeout=20)
     except (OSError, ValueError, TimeoutError) as reason:
-        raise error(f"no scheduler of Dask at {address!r}: {reason}") from reason
+        raise error(
+            f"no scheduler of Dask at {address!r}: {reason}; give tcp://HOST:PORT, its scheduler.json, or local"
+        ) from reason
 
 
 def run_dask(call: Callable[[Any], Any], tasks: Iterable[Any], client: Any, batch: int = 1) -> Iterator[Outcome]:

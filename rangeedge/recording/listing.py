@@ -13,7 +13,7 @@ from typing import Any
 from .._check import described, error, fail, public
 from ..io.source import file_name
 from .bags import bag_frames, is_bag
-from .sequences import file_frame, folder_files, is_tum, tum_frames
+from .sequences import file_frame, folder_files, is_tum, seen_by, tum_frames
 from .source import FrameSource, Unreadable
 from .stacks import is_zarr, stack_frames
 
@@ -79,6 +79,8 @@ def framesOf(
         for given in inputs
         for frame in ([given] if isinstance(given, FrameSource) else _listed(given, tuple(topics), options))
     ]
+    if topics and not any(is_bag(Path(frame.path)) for frame in frames):
+        raise error(f"`topics` = {', '.join(topics)}, but no input is a bag or MCAP file")
     return _named_apart(frames)
 
 
@@ -100,25 +102,27 @@ def _frames(path: str, topics: tuple[str, ...], options: dict[str, Any]) -> list
     where = Path(path)
     if not path or not where.exists():
         return [file_frame(path, _stem(path), **options)]
-    if where.is_dir() and not is_zarr(path) and not is_bag(where):
-        return tum_frames(where) if is_tum(where) else _of_folder(where, topics, options)
+    bag = is_bag(where)
+    if where.is_dir() and not (bag or is_tum(where) or is_zarr(path)):
+        return _of_folder(where, topics, options)
     try:
-        found = bag_frames(path, topics) if is_bag(where) else stack_frames(path)
+        found = bag_frames(path, topics) if bag else tum_frames(where) if is_tum(where) else stack_frames(path)
     except (error, ValueError, OSError) as problem:
         if isinstance(problem, error) and isinstance(problem.__cause__, ImportError):
             raise
-        if topics and is_bag(where):
+        if topics and bag:
             raise
         return [FrameSource(_stem(path), path, "", Unreadable(str(getattr(problem, "err", problem))))]
     return found or [file_frame(path, _stem(path), **options)]
 
 
 def _of_folder(folder: Path, topics: tuple[str, ...], options: dict[str, Any]) -> list[FrameSource]:
-    files, camera = folder_files(folder)
-    found = [frame for path in files for frame in _frames(str(path), topics, options)]
+    found = [frame for path in folder_files(folder) for frame in _frames(str(path), topics, options)]
     if not found:
-        raise error(f"the folder {str(folder)!r} holds no range images")
-    return [replace(frame, geometry={**camera, **frame.geometry}) for frame in found]
+        deeper = any(path.is_dir() for path in folder.iterdir())
+        way = f"; of the folders in it, give those with images, or the pattern {str(folder / '**' / '*.png')!r}"
+        raise error(f"the folder {str(folder)!r} holds no range images{way if deeper else ''}")
+    return seen_by(found, folder)
 
 
 def _stem(path: str) -> str:
@@ -131,15 +135,19 @@ def _stem(path: str) -> str:
 
 
 def _named_apart(frames: list[FrameSource]) -> list[FrameSource]:
-    """Frames of unique names: those that collide keep their suffix, then as much of their folder as it takes."""
+    """Frames of unique names: those that collide keep their suffix, then as much of their folder as it takes.
+
+    The name of one is not that of the folder of others either, whose results would be among its own.
+    """
     places = Counter((os.path.abspath(frame.path), frame.part) for frame in frames)
     twice = next((path for (path, _), count in places.items() if count > 1), None)
     if twice is not None:
         raise error(f"{twice!r} is given twice")
     folders = [Path(os.path.abspath(frame.path)).parent.parts[1:] for frame in frames]
     beside = Counter((folder, frame.name) for folder, frame in zip(folders, frames, strict=True))
+    above = {"/".join(parts[:end]) for parts in (f.name.split("/") for f in frames) for end in range(1, len(parts))}
     short = [
-        _with_suffix(frame) if beside[folder, frame.name] > 1 else frame.name
+        _with_suffix(frame) if beside[folder, frame.name] > 1 or frame.name in above else frame.name
         for folder, frame in zip(folders, frames, strict=True)
     ]
     names = short

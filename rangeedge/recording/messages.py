@@ -144,9 +144,23 @@ def camera_of(message: Any, rectified: bool = False) -> dict[str, Any]:
     K = values("P").reshape(3, 4)[:, :3] if rectified else values("K").reshape(3, 3)
     if not (K[0, 0] > 0 and K[1, 1] > 0):
         return {}
+    K, size = _as_sent(message, K)
+    known = {"K": K} if size is None else {"K": K, "imageSize": size}
     distortion = values("D")
     if rectified or not distortion.any():
-        return {"K": K}
+        return known
     if message.distortion_model not in ("plumb_bob", "rational_polynomial"):
         raise ValueError(f"its distortion is {message.distortion_model!r}; rectify the images, or give -K")
-    return {"K": K, "distCoeffs": distortion}
+    return {**known, "distCoeffs": distortion}
+
+
+def _as_sent(message: Any, K: np.ndarray) -> tuple[np.ndarray, tuple[int, int] | None]:
+    """The matrix of the images as they are sent, cut and with pixels taken together, and the size of these."""
+    region = getattr(message, "roi", None)
+    left, top = (region.x_offset, region.y_offset) if region else (0, 0)
+    width = (region and region.width) or getattr(message, "width", 0)
+    height = (region and region.height) or getattr(message, "height", 0)
+    across, down = (max(1, getattr(message, name, 1)) for name in ("binning_x", "binning_y"))
+    K = K - np.array([[0, 0, left], [0, 0, top], [0, 0, 0]])
+    K /= np.array([[across], [down], [1]])
+    return K, (width // across, height // down) if width and height else None

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import functools
 import re
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from .._check import error
 from ..io import imreadRange
 from ..io.camera import read_camera
-from .source import FrameSource
+from .source import FrameSource, places
 
 _SUFFIXES = {
     *(".png", ".pgm", ".tif", ".tiff", ".exr", ".pfm", ".npy", ".npz", ".zarr", ".pcd", ".ply", ".asc"),
@@ -37,41 +40,52 @@ def is_tum(folder: Path) -> bool:
 
 
 def tum_frames(folder: Path) -> list[FrameSource]:
-    """The depth images that ``depth.txt`` names: lines of a time and a file, in their order."""
-    frames = []
-    geometry: dict[str, Any] = {"depthFactor": _TUM_FACTOR, **_camera(folder)}
-    if "K" not in geometry and "freiburg" in folder.resolve().name:
-        geometry["K"] = _TUM_CAMERA
-    for number, line in enumerate((folder / "depth.txt").read_text("utf-8", "replace").splitlines(), 1):
+    """The depth images that ``depth.txt`` names: lines of a time and a file, in their order; each once."""
+    files: dict[str, None] = {}
+    for number, line in enumerate((folder / "depth.txt").read_text("utf-8-sig", "replace").splitlines(), 1):
         if not line.strip() or line.lstrip().startswith("#"):
             continue
         words = line.split()
-        if len(words) != 2:
+        if len(words) != 2 or "\0" in line:
             raise error(f"cannot read '{folder / 'depth.txt'}': line {number} is {line[:60]!r}, no time and file")
-        name = f"{folder.resolve().name}/{Path(words[1]).stem}"
-        frames.append(file_frame(str(folder / words[1]), name, geometry))
-    return frames
+        files[words[1]] = None
+    if not files:
+        raise error(f"'{folder / 'depth.txt'}' names no images")
+    place = folder.resolve().name
+    known = {"depthFactor": _TUM_FACTOR}
+    frames = [file_frame(str(folder / name), f"{place}/{Path(name).stem}", known) for name in files]
+    usual = {"K": _TUM_CAMERA} if "freiburg" in place else {}
+    return seen_by(frames, folder, usual)
 
 
-def folder_files(folder: Path) -> tuple[list[Path], dict[str, Any]]:
-    """The files of a folder that may be range images, by their suffix and in the order of their names; its camera."""
+def folder_files(folder: Path) -> list[Path]:
+    """The files of a folder that may be range images, by their suffix and in the order of their names."""
     files = [path for path in folder.iterdir() if path.suffix.lower() in _SUFFIXES and not path.name.startswith(".")]
-    return sorted(files, key=_natural), _camera(folder)
+    return sorted(files, key=_natural)
 
 
 def _natural(path: Path) -> list[tuple[int, int, str]]:
     """A key by which frame 10 comes after frame 9."""
-    return [(0, int(part), "") if part.isdigit() else (1, 0, part) for part in re.split(r"(\d+)", path.name) if part]
+    return [(0, int(part), "") if part.isdecimal() else (1, 0, part) for part in re.split(r"(\d+)", path.name) if part]
 
 
-def _camera(folder: Path) -> dict[str, Any]:
-    """The camera that a file of a usual name in the folder describes."""
-    for path in (folder / (stem + suffix) for stem in _CAMERAS for suffix in _CAMERA_SUFFIXES):
-        if path.is_file():
-            try:
-                camera = read_camera(path)
-            except (ValueError, OSError) as reason:
-                raise error(f"cannot read the camera {str(path)!r} of a folder: {reason}; give -K") from None
-            found = {"K": camera.K, "distCoeffs": camera.distCoeffs}
-            return {name: value for name, value in found.items() if value is not None}
-    return {}
+def seen_by(
+    frames: list[FrameSource], folder: Path, usual: Mapping[str, Any] = MappingProxyType({})
+) -> list[FrameSource]:
+    """Frames with the camera of a file of a common name in the folder, or the usual one, where they have none."""
+    known, obstacle = usual, ""
+    named = (folder / (stem + suffix) for stem in _CAMERAS for suffix in _CAMERA_SUFFIXES)
+    path = next((path for path in named if path.is_file()), None)
+    if path is not None:
+        try:
+            camera = read_camera(path)
+            found = {"K": camera.K, "distCoeffs": camera.distCoeffs, "imageSize": camera.size}
+            known = {name: value for name, value in found.items() if value is not None}
+        except (ValueError, OSError) as reason:
+            obstacle = f"the camera of its folder cannot be used: {getattr(reason, 'err', reason)}; or give -K"
+    return [
+        frame
+        if places(frame.geometry)
+        else replace(frame, geometry={**frame.geometry, **known}, obstacle=frame.obstacle or obstacle)
+        for frame in frames
+    ]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from types import ModuleType
 from typing import Any, TypeVar
@@ -13,6 +14,11 @@ from .._check import error
 from ..io import RangeImage
 
 _R = TypeVar("_R")
+
+
+def places(geometry: Mapping[str, Any]) -> bool:
+    """Whether a geometry says where pixels look."""
+    return "K" in geometry or "pixelSize" in geometry
 
 
 @dataclass(frozen=True)
@@ -34,6 +40,7 @@ class FrameSource:
     part: str
     load: Callable[[], RangeImage] = field(repr=False)
     geometry: Mapping[str, Any] = field(default_factory=dict, repr=False)
+    obstacle: str = field(default="", repr=False)  # why the camera of the recording is not known, where it has one
 
     @property
     def title(self) -> str:
@@ -41,10 +48,11 @@ class FrameSource:
         return f"{self.path}: {self.part}" if self.part else self.path
 
     def read(self, **given: Any) -> RangeImage:
-        """The range image, with the camera of the recording and a geometry that replaces it."""
+        """The range image, with the camera of its file, else of the recording, and a geometry that replaces it."""
         image = self.load()
-        image = image._replace(geometry={**image.geometry, **self.geometry})
-        return image.withGeometry(**given)
+        if self.obstacle and not places({**image.geometry, **given}):
+            raise error(self.obstacle)
+        return image._replace(geometry=dict(self.geometry)).withGeometry(**image.geometry).withGeometry(**given)
 
 
 @dataclass(frozen=True)
@@ -55,6 +63,19 @@ class Unreadable:
 
     def __call__(self) -> RangeImage:
         raise error(self.reason)
+
+
+@contextlib.contextmanager
+def failures_named(what: str, hint: Callable[[Exception], str] = lambda reason: "") -> Iterator[None]:
+    """Whatever goes wrong in a recording is an error that names it: its readers raise many types on garbled files."""
+    try:
+        yield
+    except Exception as reason:
+        if isinstance(reason, error) and what in reason.err:
+            raise
+        text = reason.err if isinstance(reason, error) else str(reason)
+        kind = "" if isinstance(reason, (error, ValueError)) else f"{type(reason).__name__}: "
+        raise error(f"cannot read {what}: {kind}{text}{hint(reason)}") from reason
 
 
 def extra(module: str, name: str, purpose: str) -> ModuleType:

@@ -11,19 +11,18 @@ from typing import Any
 
 import numpy as np
 
-from .._check import error
 from ..io import RangeImage
-from ..io.arrays import read_archive, source_name
+from ..io.arrays import source_name
 from ..io.files import as_range_image
 from ..io.source import opened
 from ..io.tiff import images_of_tiff, read_page
 from ..io.tiff_tags import Page
-from .source import FrameSource, extra, kept
+from .archives import npz_stack
+from .source import FrameSource, extra, failures_named, kept
 
 _TIFF_HEADS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _PAGES = 2**20
-_NPZ_BYTES = 2**34  # of an array that is unpacked as a whole
-_GEOMETRY = ("K", "pixelSize", "heightMap", "depthFactor")
+_GEOMETRY = ("K", "distCoeffs", "pixelSize", "heightMap", "depthFactor")
 
 
 def stack_frames(path: str) -> list[FrameSource]:
@@ -36,17 +35,20 @@ def stack_frames(path: str) -> list[FrameSource]:
     else:
         with opened(path, math.inf) as (stream, _):
             head = stream.read(6)
-            if head == b"\x93NUMPY":
-                array = npy_array(path)
-                count, load = _frames(array.shape, array.dtype), _npy_frame
-            elif head[:4] == b"PK\x03\x04":
-                array, geometry = _npz(path)
-                count, load = _frames(array.shape, array.dtype), _npz_frame
-            elif head[:4] in _TIFF_HEADS:
-                pages = len(_pages(path))
-                count, load = pages if pages > 1 else 0, _tiff_frame
-            else:
-                return []
+        if head == b"\x93NUMPY":
+            array = npy_array(path)
+            count, load = _frames(array.shape, array.dtype), _npy_frame
+        elif head[:4] == b"PK\x03\x04":
+            archive = npz_stack(path)
+            geometry = archive.geometry
+            count, load = _frames(archive.shape, archive.dtype), _npz_frame
+            if count:
+                archive.check()
+        elif head[:4] in _TIFF_HEADS:
+            pages = len(_pages(path))
+            count, load = pages if pages > 1 else 0, _tiff_frame
+        else:
+            return []
     digits = max(4, len(str(count - 1)))
     return [
         FrameSource(
@@ -68,42 +70,34 @@ def _frames(shape: tuple[int, ...], dtype: np.dtype) -> int:
 
 
 def _checked(load: Callable[[str, int], RangeImage], path: str, index: int) -> RangeImage:
-    image = load(path, index)
-    try:
+    with failures_named(f"{path!r}, frame {index}"):
+        image = load(path, index)
         return image._replace(src=as_range_image(image.src))
-    except ValueError as reason:
-        raise error(f"cannot read {path!r}, frame {index}: {reason}") from None
 
 
 @kept(4)
 def npy_array(path: str) -> np.ndarray:
     """The array of a file, read where it is looked at."""
-    return np.load(path, mmap_mode="r", allow_pickle=False)
+    with opened(path, math.inf):
+        return np.load(path, mmap_mode="r", allow_pickle=False)
 
 
 def _npy_frame(path: str, index: int) -> RangeImage:
     return RangeImage(np.array(npy_array(path)[index]))
 
 
-@kept(1)  # it may fill much of the memory
-def _npz(path: str) -> RangeImage:
-    with opened(path, math.inf) as (stream, size):
-        return read_archive(stream, size, _NPZ_BYTES)
-
-
 def _npz_frame(path: str, index: int) -> RangeImage:
-    return RangeImage(_npz(path).src[index])
+    return RangeImage(npz_stack(path).frame(index))
 
 
 @kept(4)
 def _pages(path: str) -> list[Page]:
-    with open(path, "rb") as stream:
+    with opened(path, math.inf) as (stream, _):
         return images_of_tiff(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ), _PAGES)  # type: ignore[arg-type]
 
 
 def _tiff_frame(path: str, index: int) -> RangeImage:
-    with opened(path, math.inf):
-        return read_page(_pages(path)[index])
+    return read_page(_pages(path)[index])
 
 
 def is_zarr(path: str) -> bool:
@@ -114,15 +108,14 @@ def is_zarr(path: str) -> bool:
 @kept(4)
 def zarr_array(path: str) -> tuple[Any, Mapping[str, Any]]:
     """The array of a store, or that of a group which is named as in NPZ files; attributes may hold the geometry."""
-    found = extra("zarr", "zarr", f"{path!r}").open(path, mode="r")
-    attributes = dict(found.attrs)
-    if hasattr(found, "array_keys"):
-        try:
+    zarr = extra("zarr", "zarr", f"{path!r}")
+    with failures_named(repr(path)):
+        found = zarr.open(path, mode="r")
+        attributes = dict(found.attrs)
+        if hasattr(found, "array_keys"):
             found = found[source_name(sorted(found.array_keys()))]
-        except ValueError as reason:
-            raise error(f"cannot read {path!r}: {reason}") from None
-        attributes |= dict(found.attrs)
-    return found, {key: attributes[key] for key in _GEOMETRY if key in attributes}
+            attributes |= dict(found.attrs)
+        return found, {key: attributes[key] for key in _GEOMETRY if key in attributes}
 
 
 def _zarr_frame(path: str, index: int) -> RangeImage:

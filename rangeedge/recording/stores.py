@@ -69,13 +69,17 @@ def _size_of_store(root: Path, kinds: Iterable[str]) -> tuple[int, int] | None:
 
 
 def _size(frames: Iterable[FrameSource], given: Mapping[str, Any]) -> tuple[int, int] | None:
+    """The size of the frames, the first that two of them have: one that is of another size must not come first."""
+    seen: list[tuple[int, int]] = []
     for frame in frames:
         try:
             rows, cols = frame.read(**given).src.shape[:2]
         except Exception:  # its own turn says what is wrong with it
             continue
-        return rows, cols
-    return None
+        if (rows, cols) in seen:
+            return rows, cols
+        seen.append((rows, cols))
+    return seen[0] if seen else None
 
 
 def open_arrays(root: Path, mode: str = "r+") -> Any:

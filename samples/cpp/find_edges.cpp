@@ -30,7 +30,7 @@ int main() {
     const auto candidates = rangeedge::find_candidates(frame, options, team);
     std::vector<float> jump(height.size()), crease(height.size()), significance(height.size());
     std::vector<std::uint8_t> kind(height.size());
-    rangeedge::combine(candidates, {jump.data(), crease.data(), kind.data(), significance.data()}, team);
+    rangeedge::combine(candidates, {rows * cols, jump.data(), crease.data(), kind.data(), significance.data()}, team);
 
     int edges = 0;
     for (int i = 0; i < rows * cols; ++i) edges += jump[i] > 0.25f;

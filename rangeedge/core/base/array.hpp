@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "base/memory.hpp"
+
 namespace rangeedge {
 
 template <class T>
@@ -18,8 +20,7 @@ public:
     Index size() const { return static_cast<Index>(values_.size()); }
     int count() const { return static_cast<int>(values_.size()); }  // where that is known to suffice
     bool empty() const { return values_.empty(); }
-    void resize(Index size) { values_.resize(at(size)); }
-    void resize(Index size, const T& value) { values_.resize(at(size), value); }
+    void resize(Index size, const T& value = T()) { values_.resize(at(size), value); }
     void assign(Index size, const T& value) { values_.assign(at(size), value); }
     void clear() { values_.clear(); }
     void push_back(const T& value) { values_.push_back(value); }
@@ -38,7 +39,7 @@ public:
 
 private:
     static std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-    std::vector<T> values_;
+    std::vector<T, LargeAllocator<T>> values_;
 };
 
 }  // namespace rangeedge

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <utility>
 
 #include "base/angle.hpp"
 #include "chains/line_sums.hpp"
@@ -13,11 +12,12 @@ namespace rangeedge {
 namespace {
 
 constexpr int least_arm = 6, arms[] = {least_arm, 12, 24, 48};  // positions on either side of a corner
+constexpr int least_side_arm = 12;                              // in a side view, whose noise is alike over some pixels
 constexpr int least_run = 4;                                    // positions that make a line
-constexpr int least_part = 8;                                   // pixels between two corners
 // Variance ratio of a smooth curve and two lines: to look closer, and of a corner between its neighbours.
 constexpr double possible_gain = 8, least_gain = 20;
-constexpr std::ptrdiff_t longest_arm = 96;  // positions on either side
+constexpr double most_alike_positions = 0.9, most_alike_depths = 0.97;  // correlation of neighbouring residuals
+constexpr std::ptrdiff_t longest_arm = 96;                              // positions on either side
 
 // The sum of squared residuals of a parabola over the chord.
 double parabola_rss(const Point* p, int n) {
@@ -65,8 +65,47 @@ double circle_rss(const Point* p, int n) {
     return rss;
 }
 
-// That of the smooth curve that fits better, a parabola or, where the points turn far, a circle.
-double smooth_rss(const Point* p, int n) { return std::min(parabola_rss(p, n), circle_rss(p, n)); }
+// The sum of squared residuals of the ordinates of a polynomial of third degree.
+double cubic_rss(const Point* p, int n) {
+    constexpr int terms = 4;
+    const double middle = (p[0].x + p[n - 1].x) / 2, half = std::abs(p[n - 1].x - p[0].x) / 2;
+    if (!(half > 0)) return HUGE_VAL;
+    double moments[2 * terms - 1] = {}, products[terms] = {}, rest = 0;
+    for (int k = 0; k < n; ++k) {
+        const double t = (p[k].x - middle) / half, v = p[k].y - p[0].y;
+        double power = 1;
+        for (int i = 0; i < 2 * terms - 1; ++i, power *= t) {
+            moments[i] += power;
+            if (i < terms) products[i] += power * v;
+        }
+        rest += v * v;
+    }
+    // Cholesky factors; what each of them explains is taken off.
+    double factor[terms][terms], explained[terms];
+    for (int i = 0; i < terms; ++i) {
+        for (int j = 0; j <= i; ++j) {
+            double sum = moments[i + j];
+            for (int k = 0; k < j; ++k) sum -= factor[i][k] * factor[j][k];
+            if (i != j)
+                factor[i][j] = sum / factor[j][j];
+            else if (sum > 1e-12 * moments[2 * i])
+                factor[i][i] = std::sqrt(sum);
+            else
+                return std::max(rest, 0.0);
+        }
+        explained[i] = products[i];
+        for (int k = 0; k < i; ++k) explained[i] -= factor[i][k] * explained[k];
+        explained[i] /= factor[i][i];
+        rest -= explained[i] * explained[i];
+    }
+    return std::max(rest, 0.0);
+}
+
+// That of the smooth curve that fits better, a parabola or, where the points turn far, a circle; from the side a
+// polynomial.
+double smooth_rss(const Point* p, int n, View view) {
+    return view == View::side ? cubic_rss(p, n) : std::min(parabola_rss(p, n), circle_rss(p, n));
+}
 
 struct TwoLines {
     double rss, turn;    // turn in degrees
@@ -74,7 +113,7 @@ struct TwoLines {
 };
 
 // Straight lines through the points before number `split` and through those after it.
-TwoLines two_lines(const Point* p, int n, int split) {
+TwoLines two_lines(const Point* p, int n, int split, double most_alike) {
     PointSums before, after;
     for (int k = 0; k < split; ++k) before.add(p[k].x - p[split].x, p[k].y - p[split].y);
     for (int k = split + 1; k < n; ++k) after.add(p[k].x - p[split].x, p[k].y - p[split].y);
@@ -88,18 +127,19 @@ TwoLines two_lines(const Point* p, int n, int split) {
         last = off;
     }
     const double rss = a.rss + b.rss;
-    return {rss, turn * degrees_per_radian, rss > 0 ? std::min(std::max(products / rss, 0.0), 0.9) : 0};
+    return {rss, turn * degrees_per_radian, rss > 0 ? std::min(std::max(products / rss, 0.0), most_alike) : 0};
 }
 
 // The positions along a piece, and the corners among them.
 class Corners {
 public:
-    Corners(const Array<Point>& points, bool closed, double least_angle)
-        : points_(points), closed_(closed), least_angle_(least_angle) {}
+    Corners(const Array<Point>& points, bool closed, double least_angle, View view)
+        : points_(points), closed_(closed), least_angle_(least_angle), view_(view) {}
 
     // Numbers of the points at corners, ascending.
     Array<std::ptrdiff_t> find() {
-        for (const int arm : arms) look(arm);
+        for (const int arm : arms)
+            if (view_ == View::image || arm >= least_side_arm) look(arm);
         std::sort(found_.begin(), found_.end());
         confirm();
         complete();
@@ -111,13 +151,16 @@ private:
     // Around a closed chain, once.
     const Point& at(std::ptrdiff_t i) const { return points_[i < 0 ? i + size() : i < size() ? i : i - size()]; }
 
+    int run() const { return view_ == View::side ? least_side_arm : least_run; }
+    double most_alike() const { return view_ == View::side ? most_alike_depths : most_alike_positions; }
+
     // By how much two lines are better than a smooth curve; 0 where they turn too little.
     double gain(const TwoLines& lines, int n) const {
         if (lines.turn < least_angle_) return 0;
         constexpr double rounding = 1e-4;  // squared pixels a point, so that positions without noise have some
         const double independent = (1 - lines.correlation) / (1 + lines.correlation);  // share of the points
         const double scatter = (lines.rss + rounding * n) / (n - 4) / independent;
-        return (smooth_rss(window_.data(), n) - lines.rss) / scatter;
+        return (smooth_rss(window_.data(), n, view_) - lines.rss) / scatter;
     }
 
     // That of the i-th corner, from the one before to the one after, between which it is moved to the best place.
@@ -140,7 +183,7 @@ private:
         if (split < 0) return 0;
         found_[i] = (first + split + size()) % size();
         const int n = static_cast<int>(window_.size());
-        return gain(two_lines(window_.data(), n, split), n);
+        return gain(two_lines(window_.data(), n, split, most_alike()), n);
     }
 
     // Where two lines through the points of the window leave the least; -1 where they are too few.
@@ -153,7 +196,7 @@ private:
         }
         int best = -1;
         double least = HUGE_VAL;
-        for (int split = least_run; split < n - least_run; ++split) {
+        for (int split = run(); split < n - run(); ++split) {
             const double rss = sums_[split].rss() + sums_[n].without(sums_[split + 1]).rss();
             if (rss < least) least = rss, best = split;
         }
@@ -165,14 +208,14 @@ private:
         Array<double> gains(found_.size(), 0);
         for (std::ptrdiff_t i = 0; i < found_.size(); ++i) gains[i] = confirmed_gain(i);
         while (!found_.empty()) {
-            const std::ptrdiff_t least = std::min_element(gains.begin(), gains.end()) - gains.begin();
-            if (gains[least] >= least_gain) break;
-            std::copy(gains.begin() + least + 1, gains.end(), gains.begin() + least);
-            std::copy(found_.begin() + least + 1, found_.end(), found_.begin() + least);
+            const std::ptrdiff_t weakest = std::min_element(gains.begin(), gains.end()) - gains.begin();
+            if (gains[weakest] >= least_gain) break;
+            std::copy(gains.begin() + weakest + 1, gains.end(), gains.begin() + weakest);
+            std::copy(found_.begin() + weakest + 1, found_.end(), found_.begin() + weakest);
             const std::ptrdiff_t count = found_.size() - 1;
             gains.resize(count), found_.resize(count);
             if (!count) break;
-            const std::ptrdiff_t before = (least + count - 1) % count, after = least % count;
+            const std::ptrdiff_t before = (weakest + count - 1) % count, after = weakest % count;
             gains[before] = confirmed_gain(before);
             if (after != before) gains[after] = confirmed_gain(after);
         }
@@ -190,10 +233,11 @@ private:
     }
 
     void complete(std::ptrdiff_t first, std::ptrdiff_t last) {
+        if (view_ == View::side && last - first > 2 * longest_arm) return;  // depths around a curve turn, too
         window_.clear();
         for (std::ptrdiff_t k = first; k <= last; ++k) window_.push_back(at(k));
         const int split = best_split(), n = static_cast<int>(window_.size());
-        if (split < 0 || gain(two_lines(window_.data(), n, split), n) < least_gain) return;
+        if (split < 0 || gain(two_lines(window_.data(), n, split, most_alike()), n) < least_gain) return;
         found_.push_back(first + split);
         complete(first, first + split), complete(first + split, last);
     }
@@ -237,7 +281,7 @@ private:
         for (int k = -left; k <= right; ++k) window_.push_back(at(i + k));
         const int best = best_split();
         if (best < 0) return;
-        const TwoLines lines = two_lines(window_.data(), n, best);
+        const TwoLines lines = two_lines(window_.data(), n, best, most_alike());
         if (gain(lines, n) < possible_gain) return;
         const std::ptrdiff_t corner = (i + best - left + size()) % size();
         for (const std::ptrdiff_t other : found_) {
@@ -250,55 +294,17 @@ private:
     const Array<Point>& points_;
     bool closed_;
     double least_angle_;
+    View view_;
     Array<double> turns_;
     Array<Point> window_;
     Array<PointSums> sums_;
     Array<std::ptrdiff_t> found_;
 };
 
-// The part of a chain from one member to before another.
-void add_part(const Piece& whole, std::ptrdiff_t begin, std::ptrdiff_t end, std::vector<Piece>& parts) {
-    if (end - begin < least_part) return;
-    Piece part{{}, whole.type, false};
-    for (std::ptrdiff_t i = begin; i < end; ++i) part.members.push_back(whole.members[i % whole.members.size()]);
-    parts.push_back(std::move(part));
-}
-
-void cut(Piece& chain, const std::vector<Candidate>& candidates, const Crossings& crossings, double least_angle,
-         std::vector<Piece>& parts) {
-    Array<Point> points;
-    Array<std::ptrdiff_t> members;
-    for (std::ptrdiff_t i = 0; i < chain.members.size(); ++i) {
-        Point mean;
-        if (!mean_position(candidates, crossings, chain.members[i], chain.type, mean)) continue;
-        points.push_back(mean), members.push_back(i);
-    }
-    if (points.size() < least_run) return;
-    const Array<std::ptrdiff_t> corners = Corners(points, chain.closed, least_angle).find();
-    if (corners.empty()) {
-        parts.push_back(std::move(chain));
-        return;
-    }
-    const std::ptrdiff_t n = chain.members.size(), first = members[corners[0]], last = members[corners.back()];
-    if (!chain.closed) add_part(chain, 0, first, parts);
-    for (std::ptrdiff_t i = 0; i + 1 < corners.size(); ++i)
-        add_part(chain, members[corners[i]], members[corners[i + 1]], parts);
-    add_part(chain, last, chain.closed ? first + n : n, parts);
-}
-
 }  // namespace
 
-std::vector<Piece> cut_at_corners(std::vector<Piece> chains, const std::vector<Candidate>& candidates,
-                                  const Crossings& crossings, double least_angle, Team& team) {
-    std::vector<std::vector<Piece>> parts(chains.size());
-    parallel_each(static_cast<int>(chains.size()), team, [&](int i, int) {
-        const auto k = static_cast<std::size_t>(i);
-        cut(chains[k], candidates, crossings, least_angle, parts[k]);
-    });
-    chains.clear();
-    for (std::vector<Piece>& of_one : parts)
-        for (Piece& part : of_one) chains.push_back(std::move(part));
-    return chains;
+Array<std::ptrdiff_t> find_corners(const Array<Point>& points, bool closed, double least_angle, View view) {
+    return Corners(points, closed, least_angle, view).find();
 }
 
 }  // namespace rangeedge

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "base/parallel.hpp"
-#include "chains/corners.hpp"
+#include "chains/cut.hpp"
 #include "chains/join.hpp"
 #include "chains/outline.hpp"
 #include "chains/pieces.hpp"
@@ -40,7 +40,7 @@ LinkedEdges link_edges(const Frame<T>& frame, const std::vector<Candidate>& foun
     std::vector<Piece> chains = join_pieces(find_pieces(candidates, tracing, crossings, kinds, frame.cols), candidates,
                                             crossings, {options.bridge, largest_turn});
     Team team(std::min(threads, 1 + static_cast<int>(chains.size()) / chains_per_thread));
-    chains = cut_at_corners(std::move(chains), candidates, crossings, options.corner_angle, team);
+    chains = cut_at_corners(std::move(chains), frame, candidates, crossings, options.corner_angle, team);
     chains.erase(std::remove_if(chains.begin(), chains.end(),
                                 [&](const Piece& c) { return c.members.size() < options.min_length; }),
                  chains.end());

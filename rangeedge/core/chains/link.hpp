@@ -33,6 +33,7 @@ struct ChainPoint {
     double gradient[2][2];  // of their ordinates over the plane of the image; NaN where unknown
     double significance;
     double measured[3];  // before smoothing: in the plane of the image, and the ordinate of the nearer surface
+    double deviation;    // pixels across a straight jump that pixels on both sides bound; NaN elsewhere
 };
 
 struct ChainHeader {

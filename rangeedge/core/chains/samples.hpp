@@ -3,10 +3,13 @@
 #pragma once
 #include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "base/array.hpp"
+#include "base/vector.hpp"
 #include "chains/pieces.hpp"
+#include "image/frame.hpp"
 
 namespace rangeedge {
 
@@ -30,6 +33,14 @@ struct ChainSamples {
         return std::min(std::max<std::ptrdiff_t>(k + step, 0), places() - 1);
     }
 };
+
+// The ordinate of a pixel with data.
+template <class T>
+double ordinate_at(const Frame<T>& frame, std::int32_t pixel) {
+    if (frame.ordinate) return static_cast<double>(frame.ordinate[pixel]);
+    const double along = dot(frame.point(pixel), {frame.axis[0], frame.axis[1], frame.axis[2]});
+    return frame.projective ? 1 / along : -along;
+}
 
 ChainSamples gather_samples(const Piece& chain, const std::vector<Candidate>& candidates, const Crossings& crossings);
 

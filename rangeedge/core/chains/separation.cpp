@@ -51,6 +51,31 @@ public:
         return {sum.first / whole, sum.last / whole};
     }
 
+    // The second moments of its area about its centroid, by triangles.
+    LineSpread spread(const Vertex& centre) const {
+        LineSpread sum;
+        double whole = 0;
+        for_triangles([&](const Vertex& p, const Vertex& q, double twice) {
+            Vertex corners[3] = {vertices_[0], p, q};
+            Vertex total{0, 0};
+            for (Vertex& v : corners) {
+                v.first -= centre.first, v.last -= centre.last;
+                total.first += v.first, total.last += v.last;
+            }
+            const auto add = [&](double& moment, double Vertex::* a, double Vertex::* b) {
+                double products = total.*a * total.*b;
+                for (const Vertex& v : corners) products += v.*a * v.*b;
+                moment += twice * products / 12;
+            };
+            add(sum.first_first, &Vertex::first, &Vertex::first);
+            add(sum.first_last, &Vertex::first, &Vertex::last);
+            add(sum.last_last, &Vertex::last, &Vertex::last);
+            whole += twice;
+        });
+        sum.first_first /= whole, sum.first_last /= whole, sum.last_last /= whole;
+        return sum;
+    }
+
 private:
     LineSet() = default;
 
@@ -79,15 +104,15 @@ private:
 
 }  // namespace
 
-void separate(const Array<PixelPair>& pairs, AffineFit& fit) {
+bool separate(const Array<PixelPair>& pairs, AffineFit& fit, LineSpread& spread) {
     const std::ptrdiff_t n = pairs.size();
-    if (n < 2) return;
+    if (n < 2) return false;
     double begin = HUGE_VAL, end = -HUGE_VAL;
     for (const PixelPair& p : pairs) {
         begin = std::min({begin, p.upper_position, p.lower_position});
         end = std::max({end, p.upper_position, p.lower_position});
     }
-    if (!(end > begin)) return;
+    if (!(end > begin)) return false;
     LineSet lines(farthest);
     const auto below = [&](double position, double value, double sign) {
         const double share = (position - begin) / (end - begin);
@@ -99,12 +124,15 @@ void separate(const Array<PixelPair>& pairs, AffineFit& fit) {
         const PixelPair& p = pairs[k % 2 ? n / 2 - 1 - k / 2 : n / 2 + k / 2];
         const bool upper = below(p.upper_position, p.upper, 1), lower = below(p.lower_position, p.lower, -1);
         conflicts += !upper || !lower;
-        if (conflicts * pairs_per_conflict > n) return;
+        if (conflicts * pairs_per_conflict > n) return false;
     }
     const Vertex middle = lines.centroid();
     const double slope = (middle.last - middle.first) / (end - begin);
     fit.value += middle.first + slope * (fit.centre - begin);
     fit.slope += slope;
+    spread = lines.spread(middle);
+    spread.first = begin, spread.last = end;
+    return true;
 }
 
 }  // namespace rangeedge

@@ -5,6 +5,9 @@
 // a pixel (the preimage of a digital line: Dorst & Smeulders, PAMI 6(4), 1984). Its centroid is the best estimate.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
+#include <cmath>
+
 #include "base/array.hpp"
 #include "chains/channel.hpp"
 
@@ -16,8 +19,19 @@ struct PixelPair {
     double lower_position, lower;  // and above
 };
 
-// Moves a fit to the middle of all lines that separate the pairs. Leaves it where too many contradict each other, as in
-// noise.
-void separate(const Array<PixelPair>& pairs, AffineFit& fit);
+// How far lines lie from their middle one: the covariance of their values at two positions, all lines being as likely.
+struct LineSpread {
+    double first = 0, last = 0;  // positions
+    double first_first = 0, first_last = 0, last_last = 0;
+
+    double deviation_at(double position) const {
+        const double t = (position - first) / (last - first), s = 1 - t;
+        return std::sqrt(std::max(s * s * first_first + 2 * s * t * first_last + t * t * last_last, 0.0));
+    }
+};
+
+// Moves a fit to the middle of all lines that separate the pairs. Leaves it, and returns false, where too many
+// contradict each other, as in noise.
+bool separate(const Array<PixelPair>& pairs, AffineFit& fit, LineSpread& spread);
 
 }  // namespace rangeedge

@@ -48,6 +48,7 @@ public:
     SmoothChain smooth() {
         if (places() < 2) return {};
         result_.points.resize(static_cast<std::size_t>(places()));
+        for (ChainPoint& p : result_.points) p.deviation = nan;
         find_positions();
         find_plane();
         for (const int side : {0, 1}) find_ordinates(side);
@@ -112,11 +113,13 @@ private:
         }
         if (!fit.fits) return false;
         result_.straight = true;
-        if (jumps_) separate(pixel_pairs(line), fit);
+        LineSpread spread;
+        const bool bounded = jumps_ && separate(pixel_pairs(line), fit, spread);
         positions_.resize(places());
         for (std::ptrdiff_t k = 0; k < places(); ++k) {
             const double t = line.along(means_[k].x, means_[k].y), off = fit.at(t);
             positions_[k] = t;
+            if (bounded) point(k).deviation = spread.deviation_at(t);
             point(k).x = line.x + t * line.dx - off * line.dy;
             point(k).y = line.y + t * line.dy + off * line.dx;
         }
@@ -231,25 +234,17 @@ private:
         return s.candidate->sides[(side == 0) != s.before_left];
     }
 
-    double ordinate_at(std::int32_t pixel) const {
-        if (frame_.ordinate) return static_cast<double>(frame_.ordinate[pixel]);
-        double along = 0;
-        for (int i = 0; i < 3; ++i)
-            along += static_cast<double>(frame_.points[3 * std::ptrdiff_t{pixel} + i]) * frame_.axis[i];
-        return frame_.projective ? 1 / along : -along;
-    }
-
     // The share of a length on the line of sight that lies along the axis, where jumps are measured on that.
     double along_axis(std::int32_t pixel) const {
         if (!frame_.ranges) return 1;
-        return 1 / (std::abs(ordinate_at(pixel)) * length(frame_.point(pixel)));
+        return 1 / (std::abs(ordinate_at(frame_, pixel)) * length(frame_.point(pixel)));
     }
 
     // Of a surface beside an edge, moved along the scan line to where the candidate was moved.
     double ordinate(const ChainSample& s, int side) const {
         const Candidate& c = *s.candidate;
         if (!has_sides(c)) {
-            const double near = ordinate_at(c.kind & occluding_bit ? c.before : c.after),
+            const double near = ordinate_at(frame_, c.kind & occluding_bit ? c.before : c.after),
                          jump = static_cast<double>(c.jump) * along_axis(c.before);
             if (side == 0) return near;
             return frame_.projective ? 1 / (1 / near + jump) : near - jump;
@@ -333,6 +328,9 @@ private:
             ChainPoint& p = point(k);
             for (double& v : p.measured) v = counts[k] ? v / counts[k] : nan;
             if (!frame_.points && counts[k]) to_plane(means_[k].x, means_[k].y, p.measured);
+            const double* gradient = p.gradient[0];
+            if (gradients_known_ && std::isfinite(gradient[0]))
+                for (const int axis : {0, 1}) p.measured[2] += (p.measured[axis] - p.plane[axis]) * gradient[axis];
         }
     }
 

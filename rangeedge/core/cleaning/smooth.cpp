@@ -19,17 +19,19 @@ constexpr double outlying = 5;   // deviations from which on a pixel is somethin
 constexpr int apart = 10;        // pixels, from where on means over few err independently while the form is the same
 constexpr int every = 4;         // pixel counts where deviations are measured
 constexpr float least = 1e-20f;  // weight of a mean that has any
+constexpr int strip = 16;        // columns that are gone along together
 
-using Pair = std::array<float, 2>;  // over few, over many pixels
+template <std::size_t N>
+using Sums = std::array<float, N>;
 
-// Sums of residuals and of their weights, over few and over many pixels.
-struct Sums {
-    std::array<float, 4> of{};
-
-    void add(const std::array<float, 4>& factor, const Sums& s) {
-        for (std::size_t k = 0; k < 4; ++k) of[k] += factor[k] * s.of[k];
-    }
-};
+template <std::size_t N>
+void add(Sums<N>& to, const Sums<N>& sums) {
+    for (std::size_t k = 0; k < N; ++k) to[k] += sums[k];
+}
+template <std::size_t N>
+void scale(Sums<N>& sums, const Sums<N>& factor) {
+    for (std::size_t k = 0; k < N; ++k) sums[k] *= factor[k];
+}
 
 // The a of which the weights a^|d| have a standard deviation: its square is 2 a / (1 - a)^2.
 float decay(double radius) {
@@ -41,85 +43,96 @@ class Means {
 public:
     // Of `residual`; NaN does not count. What means over few and over many pixels leave of it is averaged once more and
     // added, since a mean is too low on top of a bulge by about as much as the mean of what it leaves is too high.
-    Means(const OrdinateMap& map, const Array<float>& residual, const std::int32_t* labels, double radius, int threads)
-        : map_(map), labels_(labels), team_(threads), left_(map.size()), sums_(map.size()), mean_(map.size(), Pair{}) {
-        const float fine = decay(std::min(few, radius)), coarse = decay(radius);
-        factor_ = {fine, fine, coarse, coarse};
-        for (int p = 0; p < map.size(); ++p) left_[p] = {residual[p], residual[p]};
-        for (int round = 0; round < 2; ++round) {
-            parallel_for(map.rows, team_, [&](int begin, int end, int) {
-                for (int row = begin; row < end; ++row) along_row(row);
+    Means(const OrdinateMap& map, const Array<float>& residual, const std::int32_t* labels, double radius, Team& team)
+        : map_(map), labels_(labels), team_(team), mean_(map.size()), weight_(map.size()) {
+        const float few_decay = decay(std::min(few, radius)), many_decay = decay(radius);
+        const auto known = [&](int p) { return residual[p] == residual[p]; };
+        average<4>(
+            {few_decay, many_decay, few_decay, many_decay},
+            [&](int p) { return known(p) ? Sums<4>{residual[p], residual[p], 1, 1} : Sums<4>{}; },
+            [&](int p, const Sums<4>& s) {
+                weight_[p] = {s[2], s[3]};
+                mean_[p] = {over(s[0], s[2]), over(s[1], s[3])};
             });
-            parallel_for(map.cols, team_, [&](int begin, int end, int) { along_columns(begin, end); });
-            parallel_for(map.size(), team_, [&](int begin, int end, int) {
-                for (int p = begin; p < end; ++p) take(p);
+        average<2>(
+            {few_decay, many_decay},
+            [&](int p) { return known(p) ? Sums<2>{residual[p] - mean_[p][0], residual[p] - mean_[p][1]} : Sums<2>{}; },
+            [&](int p, const Sums<2>& s) {
+                mean_[p][0] += over(s[0], weight_[p][0]), mean_[p][1] += over(s[1], weight_[p][1]);
             });
-        }
     }
 
     // The mean of the residuals at a pixel, over few pixels and over many.
-    Pair at(int p) const { return mean_[p]; }
+    Sums<2> at(int p) const { return mean_[p]; }
 
 private:
-    Sums own(int p) const {
-        if (!(left_[p][0] == left_[p][0])) return {};
-        return {{left_[p][0], 1, left_[p][1], 1}};
+    static float over(float sum, float weight) { return weight > least ? sum / weight : 0; }
+
+    // Calls take(p, sum of own(q) factor^(columns and rows apart)) for all pixels p.
+    template <std::size_t N, class Own, class Take>
+    void average(const Sums<N>& factor, Own&& own, Take&& take) {
+        Array<Sums<N>> sums(map_.size());
+        parallel_for(map_.rows, team_, [&](int begin, int end, int) {
+            for (int row = begin; row < end; ++row) along_row(row, factor, own, sums);
+        });
+        parallel_for((map_.cols + strip - 1) / strip, team_, [&](int begin, int end, int) {
+            Array<Sums<N>> before(static_cast<typename Array<Sums<N>>::Index>(map_.rows) * strip);
+            for (int k = begin; k < end; ++k)
+                along_columns(k * strip, std::min((k + 1) * strip, map_.cols), factor, sums, before, take);
+        });
     }
-    void take(int p) {
-        const std::array<float, 4>& s = sums_[p].of;
-        for (std::size_t k = 0; k < 2; ++k) {
-            const float more = s[2 * k + 1] > least ? s[2 * k] / s[2 * k + 1] : 0;
-            mean_[p][k] += more, left_[p][k] -= more;
-        }
-    }
-    // Each pixel takes what the one before it has from as far back as the surface goes, then from the other side what
-    // that one has without its own.
-    void along_row(int row) {
+    // Each pixel takes what the one before it has from as far back as the surface goes, and what the one after it has.
+    template <std::size_t N, class Own>
+    void along_row(int row, const Sums<N>& factor, Own&& own, Array<Sums<N>>& sums) const {
         const int first = row * map_.cols, end = first + map_.cols;
+        Sums<N> before{}, after{};
         for (int p = first; p < end; ++p) {
-            sums_[p] = own(p);
-            if (p > first && labels_[p] == labels_[p - 1]) sums_[p].add(factor_, sums_[p - 1]);
+            if (p > first && labels_[p] != labels_[p - 1]) before = {};
+            scale(before, factor);
+            add(before, own(p));
+            sums[p] = before;
         }
-        Sums after{};
         for (int p = end - 1; p >= first; --p) {
-            if (p + 1 == end || labels_[p] != labels_[p + 1]) after = {};
-            for (std::size_t k = 0; k < 4; ++k) after.of[k] *= factor_[k];
-            sums_[p].add({1, 1, 1, 1}, after);
-            after.add({1, 1, 1, 1}, own(p));
+            if (p + 1 < end && labels_[p] != labels_[p + 1]) after = {};
+            scale(after, factor);
+            add(sums[p], after);
+            add(after, own(p));
         }
     }
-    void along_columns(int begin, int end) {
-        Array<Sums> carried(end - begin), before(static_cast<Array<Sums>::Index>(map_.rows) * (end - begin));
+    template <std::size_t N, class Take>
+    void along_columns(int begin, int end, const Sums<N>& factor, const Array<Sums<N>>& sums, Array<Sums<N>>& before,
+                       Take&& take) const {
+        std::array<Sums<N>, strip> carried{};
+        const auto carry = [&](int col, int p, int beside) -> Sums<N>& {
+            Sums<N>& own = carried[static_cast<std::size_t>(col - begin)];
+            if (labels_[p] != labels_[beside]) own = {};
+            scale(own, factor);
+            return own;
+        };
         for (int row = 0; row < map_.rows; ++row)
             for (int col = begin; col < end; ++col) {
                 const int p = row * map_.cols + col;
-                Sums& above = carried[col - begin];
-                if (row == 0 || labels_[p] != labels_[p - map_.cols]) above = {};
-                for (std::size_t k = 0; k < 4; ++k) above.of[k] *= factor_[k];
-                before[static_cast<Array<Sums>::Index>(row) * (end - begin) + col - begin] = above;
-                above.add({1, 1, 1, 1}, sums_[p]);
+                Sums<N>& above = carry(col, p, row > 0 ? p - map_.cols : p);
+                before[row * strip + col - begin] = above;
+                add(above, sums[p]);
             }
-        std::fill(carried.begin(), carried.end(), Sums{});
+        carried = {};
         for (int row = map_.rows - 1; row >= 0; --row)
             for (int col = begin; col < end; ++col) {
                 const int p = row * map_.cols + col;
-                Sums& below = carried[col - begin];
-                if (row + 1 == map_.rows || labels_[p] != labels_[p + map_.cols]) below = {};
-                for (std::size_t k = 0; k < 4; ++k) below.of[k] *= factor_[k];
-                const Sums here = sums_[p];
-                sums_[p].add({1, 1, 1, 1}, below);
-                sums_[p].add({1, 1, 1, 1}, before[static_cast<Array<Sums>::Index>(row) * (end - begin) + col - begin]);
-                below.add({1, 1, 1, 1}, here);
+                Sums<N>& below = carry(col, p, row + 1 < map_.rows ? p + map_.cols : p);
+                Sums<N> all = before[row * strip + col - begin];
+                add(all, below);
+                add(all, sums[p]);
+                add(below, sums[p]);
+                take(p, all);
             }
     }
 
     const OrdinateMap& map_;
     const std::int32_t* labels_;
-    Team team_;
-    Array<Pair> left_;
-    Array<Sums> sums_;
-    Array<Pair> mean_;
-    std::array<float, 4> factor_{};
+    Team& team_;
+    Array<Sums<2>> mean_, weight_;
 };
 
 // The deviation of values on every surface, if their noise is normal: from the median of their magnitudes.
@@ -130,7 +143,7 @@ std::vector<float> deviations(const OrdinateMap& map, const std::int32_t* labels
         for (int col = row % every; col < map.cols; col += every) {
             const int p = row * map.cols + col;
             if (labels[p] <= 0 || !map.valid(p)) continue;
-            const float here = std::abs(value(p));
+            const float here = std::abs(value(row, col));
             if (here == here) found[static_cast<std::size_t>(labels[p])].push_back(here);
         }
     std::vector<float> deviation(found.size());
@@ -144,47 +157,69 @@ std::vector<float> deviations(const OrdinateMap& map, const std::int32_t* labels
     return deviation;
 }
 
+// A pixel `apart` from one, in the same row, or in the same column of a narrow image; -1 where there is none.
+int pixel_apart(const OrdinateMap& map, int row, int col) {
+    const bool narrow = map.cols < 2 * apart;
+    const int p = row * map.cols + col, step = narrow ? apart * map.cols : apart;
+    const int at = narrow ? row : col, count = narrow ? map.rows : map.cols;
+    return at + apart < count ? p + step : at >= apart ? p - step : -1;
+}
+
 }  // namespace
 
 void smooth_surfaces(const OrdinateMap& map, const std::vector<Surface>& surfaces, const std::int32_t* labels,
                      double radius, int threads, float* smoothed) {
     constexpr float nan = std::numeric_limits<float>::quiet_NaN();
     const int count = static_cast<int>(surfaces.size());
-    const auto label_of = [&](int p) { return static_cast<std::size_t>(labels[p]); };
-    const auto surface_at = [&](int p) { return surfaces[label_of(p)].value(map.x_of(p), map.y_of(p)); };
+    Team team(threads);
+    const auto for_labelled = [&](auto&& visit) {
+        parallel_for(map.rows, team, [&](int begin, int end, int) {
+            for (int row = begin; row < end; ++row)
+                for (int p = row * map.cols, col = 0; col < map.cols; ++p, ++col)
+                    if (labels[p] > 0) visit(p, row, col, static_cast<std::size_t>(labels[p]));
+        });
+    };
+    const auto surface_at = [&](int p, int row, int col, std::size_t label) {
+        return surfaces[label].value(map.x ? static_cast<double>(map.x[p]) : col,
+                                     map.y ? static_cast<double>(map.y[p]) : row);
+    };
     Array<float> residual(map.size(), nan);
-    for (int p = 0; p < map.size(); ++p)
-        if (labels[p] > 0 && map.valid(p))
-            residual[p] = static_cast<float>(static_cast<double>(map.ordinate[p]) - surface_at(p));
-    const std::vector<float> spread = deviations(map, labels, count, [&](int p) { return residual[p]; });
+    for_labelled([&](int p, int row, int col, std::size_t label) {
+        if (map.valid(p))
+            residual[p] = static_cast<float>(static_cast<double>(map.ordinate[p]) - surface_at(p, row, col, label));
+    });
+    const std::vector<float> spread =
+        deviations(map, labels, count, [&](int row, int col) { return residual[row * map.cols + col]; });
     Array<float> inlying = residual;
-    for (int p = 0; p < map.size(); ++p)
-        if (labels[p] > 0 && std::abs(residual[p]) > static_cast<float>(outlying) * spread[label_of(p)])
-            inlying[p] = nan;
+    for_labelled([&](int p, int, int, std::size_t label) {
+        if (std::abs(residual[p]) > static_cast<float>(outlying) * spread[label]) inlying[p] = nan;
+    });
 
-    const Means means(map, inlying, labels, radius, threads);
+    const Means means(map, inlying, labels, radius, team);
     const auto detail_at = [&](int p) {
         const auto [fine, coarse] = means.at(p);
         return fine - coarse;
     };
-    const std::vector<float> difference = deviations(map, labels, count, [&](int p) {
-        const int q = p % map.cols + apart < map.cols ? p + apart : p - apart;
+    const std::vector<float> difference = deviations(map, labels, count, [&](int row, int col) {
+        const int p = row * map.cols + col, q = pixel_apart(map, row, col);
         return q < 0 || labels[q] != labels[p] ? nan : (detail_at(p) - detail_at(q)) / std::sqrt(2.0f);
     });
-    const auto mean_at = [&](int p) {
+    const auto mean_at = [&](int p, std::size_t label) {
         const float coarse = means.at(p)[1], detail = detail_at(p),
-                    limit = static_cast<float>(noisy) * difference[label_of(p)];
+                    limit = static_cast<float>(noisy) * difference[label];
         // From the one to the other without a step.
         return coarse + (std::abs(detail) > limit ? 1 - limit * limit / (detail * detail) : 0) * detail;
     };
-    const std::vector<float> noise = deviations(map, labels, count, [&](int p) { return residual[p] - mean_at(p); });
-    for (int p = 0; p < map.size(); ++p) {
-        smoothed[p] = nan;
-        if (labels[p] <= 0) continue;
-        const float mean = mean_at(p);
-        if (std::abs(residual[p] - mean) > static_cast<float>(outlying) * noise[label_of(p)]) continue;
-        smoothed[p] = static_cast<float>(surface_at(p) + static_cast<double>(mean));
-    }
+    const std::vector<float> noise = deviations(map, labels, count, [&](int row, int col) {
+        const int p = row * map.cols + col;
+        return residual[p] - mean_at(p, static_cast<std::size_t>(labels[p]));
+    });
+    std::fill(smoothed, smoothed + map.size(), nan);
+    for_labelled([&](int p, int row, int col, std::size_t label) {
+        const float mean = mean_at(p, label);
+        if (std::abs(residual[p] - mean) > static_cast<float>(outlying) * noise[label]) return;
+        smoothed[p] = static_cast<float>(surface_at(p, row, col, label) + static_cast<double>(mean));
+    });
 }
 
 }  // namespace rangeedge

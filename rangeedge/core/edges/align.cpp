@@ -12,7 +12,6 @@ constexpr double least_crossing = 0.3;  // pixels that a step of the scan line m
 
 template <class T>
 void align(Candidate& c, const NeighbourGrid::Near& near, const Frame<T>& frame, double max_shift, double max_spreads) {
-    if ((c.kind & jump_bit) || !(c.crease > 0)) return;
     const CommonLine line = common_line(near);
     const Step step = step_of(c.direction);
     const double across = step.dcol * line.normal[0] + step.drow * line.normal[1];

@@ -2,7 +2,6 @@
 #include "edges/combine.hpp"
 
 #include <algorithm>
-#include <limits>
 
 #include "base/watch.hpp"
 
@@ -24,7 +23,10 @@ struct Band {
 };
 
 void combine(const std::vector<Candidate>& candidates, const Band& band, const EdgeMaps& maps) {
-    const auto [jump, crease, kind, significance] = maps;
+    const auto [size, jump, crease, kind, significance] = maps;
+    const std::ptrdiff_t pixels = band.last - band.first;
+    for (float* map : {jump, crease, significance}) std::fill_n(map + band.first, pixels, 0.0f);
+    std::fill_n(kind + band.first, pixels, std::uint8_t{0});
     constexpr int jumps = jump_bit | occluding_bit | occluded_bit, creases = convex_bit | concave_bit;
     Checkpoints checkpoints(64);  // each of which may be the first to touch its piece of memory
     std::vector<const Candidate*> others;
@@ -65,11 +67,9 @@ void combine(const std::vector<Candidate>& candidates, const Band& band, const E
 }  // namespace
 
 void combine(const std::vector<Candidate>& candidates, const EdgeMaps& maps, Team& team) {
-    if (candidates.empty()) return;
     // Candidates lie row by row of the image, nearly: where their number is divided evenly, pixels are.
     const auto border = [&](int i) {
-        if (i == 0) return std::int32_t{0};
-        if (i == team.size()) return std::numeric_limits<std::int32_t>::max();
+        if (i == 0 || i == team.size() || candidates.empty()) return i == 0 ? 0 : maps.size;
         return candidates[candidates.size() * static_cast<std::size_t>(i) / static_cast<std::size_t>(team.size())]
             .before;
     };

@@ -13,14 +13,15 @@
 
 namespace rangeedge {
 
-// A value for each pixel of the image.
+// A value for each of the pixels of an image.
 struct EdgeMaps {
+    std::int32_t size;  // pixels
     float *jump, *crease;
     std::uint8_t* kind;
     float* significance;
 };
 
-// The maps hold zeros before. Of equal creases, convex. The order of candidates decides nothing but how evenly threads
+// The maps hold zeros where there are none. Of equal creases, convex. The order of candidates decides nothing but how evenly threads
 // share them: they should lie row by row.
 void combine(const std::vector<Candidate>& candidates, const EdgeMaps& maps, Team& team);
 

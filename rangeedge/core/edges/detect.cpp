@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "base/parallel.hpp"
-#include "edges/cells.hpp"
 #include "edges/neighbours.hpp"
 #include "edges/position.hpp"
 #include "edges/shadow.hpp"
@@ -140,7 +139,6 @@ private:
         const EdgeSide f2 = options_.endpoint ? from_endpoint(line, g, edge.after, x) : at_position(line, g, x);
         double jump = edge.intersects ? 0 : jump_strength(line, x, f1, f2);
         if (jump > 0) jump = std::min(jump, largest_jump(line, edge.before, edge.after));
-        double crease = crease_strength(f1, f2);
 
         const int n1 = a.segments[i].size(), n2 = a.segments[j].size();
         const FitNoise& noise = *line.noise;
@@ -151,18 +149,24 @@ private:
                                                     value_deviation(noise, sigma2, n2, f2.value_variance));
         const FitDeviation of_crease = crease_deviation(f1, slope1, f2, slope2);
         const double difference = std::abs(f1.ordinate - f2.ordinate);
-        double jump_significance = difference / of_jump.shared, crease_significance = crease / of_crease.shared;
-        const double seen_jump = jump, seen_crease = crease;
+        double jump_significance = difference / of_jump.shared;
+        const double seen_jump = jump;
         const double least = std::min(lone_significance, options_.min_significance);
         if (!std::isfinite(jump) || !(difference >= least * of_jump.single)) jump = jump_significance = 0;
-        if (!std::isfinite(crease) || !(crease >= least * of_crease.single)) crease = crease_significance = 0;
         bool jumps = jump > 0 && is_jump(line, edge.before, edge.after, difference, difference / of_jump.single);
         const bool smooth = jumps && is_smooth(line, edge.before, edge.after, steps, difference);
         if (smooth) jump = jump_significance = 0, jumps = false;
         const double step = (line.abscissa(edge.after) - line.abscissa(edge.before)) / (edge.after - edge.before);
-        const bool bends = bends_smoothly(line, edge.before, edge.after, std::abs(f1.slope - f2.slope) * step);
-        if (jumps || bends) crease = crease_significance = 0;
+        const double bend = std::abs(f1.slope - f2.slope) * step;
+        const bool bends = (!jumps || trace_) && bends_smoothly(line, edge.before, edge.after, bend);
+        double crease = 0, crease_significance = 0;
+        if (!jumps && !bends && may_exceed(f1, f2, least * of_crease.single)) {
+            crease = crease_strength(f1, f2);
+            if (!std::isfinite(crease) || !(crease >= least * of_crease.single)) crease = 0;
+            crease_significance = crease / of_crease.shared;
+        }
         if (trace_) {
+            const double seen_crease = crease_strength(f1, f2);
             CutTrace t{};
             t.cut = edge.sample - edge.shift, t.sample = edge.sample;
             t.before = edge.before, t.after = edge.after, t.jump = seen_jump, t.crease = seen_crease;
@@ -176,6 +180,7 @@ private:
         }
 
         Candidate c{};
+        if (!(jump > 0 || crease > 0)) return c;
         c.jump = within_range(jump);
         c.crease = static_cast<float>(crease);
         // A jump that is none by itself says nothing of a crease.
@@ -185,7 +190,6 @@ private:
             c.kind |= static_cast<std::uint8_t>(jump_bit | (f1.ordinate > f2.ordinate ? occluding_bit : occluded_bit));
         if (crease > 0) c.kind |= is_convex(f1, f2) ? convex_bit : concave_bit;
         locate(c, line, edge);
-        const double bend = std::abs(f1.slope - f2.slope) * step;
         c.spread = within_range(of_jump.single / bend);
         c.sides[0] = side(line, x, f1, slope1.single);
         c.sides[1] = side(line, x, f2, slope2.single);
@@ -264,22 +268,6 @@ void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, T
     if (smeared) mask.write(smeared);
 }
 
-// All candidates by their place in the image, numbered by direction, then by line, then along the line.
-std::vector<Candidate> sorted(std::vector<Part>& parts, int rows, int cols, Team& team) {
-    std::vector<const Candidate*> found;
-    for (Part& part : parts)
-        for (Candidate& c : part.found.candidates) {
-            c.order = static_cast<std::int32_t>(found.size());
-            found.push_back(&c);
-        }
-    const auto at = [&](int i) -> const Candidate& { return *found[static_cast<std::size_t>(i)]; };
-    std::vector<Candidate> candidates(found.size());
-    Cells cells(rows, cols);
-    cells.sort(static_cast<int>(found.size()), at, team,
-               [&](std::int32_t i, int k) { candidates[static_cast<std::size_t>(k)] = at(i); });
-    return candidates;
-}
-
 }  // namespace
 
 template <class T>
@@ -303,9 +291,13 @@ std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOpti
         }
     });
     clear_smear(parts, frame.rows, frame.cols, options.directions, team, smeared);
-    std::vector<Candidate> candidates = sorted(parts, frame.rows, frame.cols, team);
+    std::vector<const Candidate*> found;
+    for (const Part& part : parts)
+        for (const Candidate& c : part.found.candidates) found.push_back(&c);
+    NeighbourGrid grid(frame.rows, frame.cols, team);
+    std::vector<Candidate> candidates = in_place(found, grid);
     parts.clear();
-    join_neighbours(candidates, frame, options, team, weak);
+    join_neighbours(candidates, grid, frame, options, weak);
     return candidates;
 }
 

@@ -16,7 +16,7 @@
 
 namespace rangeedge {
 
-constexpr float reach = Cells::size;  // pixels; weights fall from 1 at the candidate itself to 0 there
+constexpr float support = Cells::size;  // pixels; weights fall from 1 at the candidate itself to 0 there
 
 // What neighbours are asked for, one array each: their places, and from `first_field` on what the task needs.
 enum Field { x_field, y_field, first_field };
@@ -26,19 +26,19 @@ class NeighbourGrid {
 public:
     NeighbourGrid(int rows, int cols, Team& team) : cells_(rows, cols), team_(team) {}
 
-    // Takes these candidates in place of those before, with room for so many fields.
-    void sort(const std::vector<Candidate>& candidates, int fields) {
-        const auto count = static_cast<std::ptrdiff_t>(candidates.size());
+    // Takes candidates in place of those before, with room for so many fields: `count` of them, at(i) being the i-th.
+    // place(i, k) is called on any thread once it has its place, and returns the index by which it is visited.
+    template <class At, class Place>
+    void sort(int count, int fields, At&& at, Place&& place) {
         stride_ = count + lanes;
         order_.resize(count);
         kinds_.resize(stride_);
         fields_.resize(stride_ * fields);
         std::fill(kinds_.begin() + count, kinds_.end(), 0);
         for (int f = 0; f < fields; ++f) std::fill_n(field(f) + count, lanes, 0.0f);
-        const auto at = [&](int i) -> const Candidate& { return candidates[static_cast<std::size_t>(i)]; };
-        cells_.sort(static_cast<int>(count), at, team_, [&](std::int32_t i, std::ptrdiff_t k) {
+        cells_.sort(count, at, team_, [&](std::int32_t i, std::int32_t k) {
             const Candidate& c = at(i);
-            order_[k] = i;
+            order_[k] = place(i, k);
             kinds_[k] = (c.kind & kinds) | c.direction << direction_shift;
             field(x_field)[k] = c.x;
             field(y_field)[k] = c.y;
@@ -107,14 +107,14 @@ private:
 };
 
 // Calls visit(k, weights, dx, dy) for the candidates k, k + 1, ... several at a time: their distances from the one they
-// are near, and weights (1 - d^2 / reach^2)^2 that are 0 for those beyond reach or of another kind.
+// are near, and weights (1 - d^2 / support^2)^2 that are 0 for those beyond it or of another kind.
 template <int bytes, class Visit>
 RANGEEDGE_INLINE void for_each_lanes(const NeighbourGrid::Near& near, Visit&& visit) {
     using F = Floats<bytes>;
     using I = Ints<bytes>;
     const float *x = near.grid->field(x_field), *y = near.grid->field(y_field);
     const int* kinds_there = near.grid->kinds_of_all();
-    const F cx = F::all(near.x), cy = F::all(near.y), one = F::all(1), per_square = F::all(1 / (reach * reach));
+    const F cx = F::all(near.x), cy = F::all(near.y), one = F::all(1), per_square = F::all(1 / (support * support));
     const F half = F::all(0.5f);
     const I own = I::all(near.kinds), none = I::all(0);
     for (int i = 0; i < 3; ++i)

@@ -34,20 +34,24 @@ RANGEEDGE_VERSIONS(float, evidence, (const NeighbourGrid::Near& near), (near))
 
 }  // namespace
 
+std::vector<Candidate> in_place(const std::vector<const Candidate*>& found, NeighbourGrid& grid) {
+    std::vector<Candidate> candidates(found.size());
+    const auto at = [&](int i) -> const Candidate& { return *found[static_cast<std::size_t>(i)]; };
+    grid.sort(static_cast<int>(found.size()), evidence_field + 1, at, [&](std::int32_t i, std::int32_t k) {
+        Candidate& c = candidates[static_cast<std::size_t>(k)];
+        c = at(i);
+        c.order = i;
+        return k;
+    });
+    return candidates;
+}
+
 template <class T>
-void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, const ScanLineOptions& options,
-                     Team& team, std::vector<Candidate>* weak_ones) {
+void join_neighbours(std::vector<Candidate>& candidates, NeighbourGrid& grid, const Frame<T>& frame,
+                     const ScanLineOptions& options, std::vector<Candidate>* weak_ones) {
     const auto least = static_cast<float>(options.min_significance);
     const bool aligned = options.max_shift > 0;
     if (!(least > 0 || aligned || options.normals)) return;
-    Checkpoints checkpoints;
-    const auto weak = [&](const Candidate& c) { return c.significance < least; };
-    const auto goes = [&](const Candidate& c) {
-        checkpoints.pass();
-        return weak(c);
-    };
-    NeighbourGrid grid(frame.rows, frame.cols, team);
-    grid.sort(candidates, evidence_field + 1);
     grid.for_each([&](std::size_t i, std::ptrdiff_t k) {
         const float s = std::min(candidates[i].significance, largest_share);
         grid.field(evidence_field)[k] = s * s;
@@ -56,27 +60,45 @@ void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, 
         Candidate& c = candidates[i];
         c.significance = std::max(std::sqrt(evidence(near)), c.significance * lone_share);
     });
+    Checkpoints checkpoints;
+    const auto weak = [&](const Candidate& c) { return c.significance < least; };
+    const auto goes = [&](const Candidate& c) {
+        checkpoints.pass();
+        return weak(c);
+    };
     if (weak_ones) std::copy_if(candidates.begin(), candidates.end(), std::back_inserter(*weak_ones), weak);
     candidates.erase(std::remove_if(candidates.begin(), candidates.end(), goes), candidates.end());
+
+    // Jumps have no more to do with each other.
+    std::vector<std::int32_t> creases;
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+        if (candidates[i].crease > 0) creases.push_back(static_cast<std::int32_t>(i));
+    const auto crease = [&](int i) { return creases[static_cast<std::size_t>(i)]; };
+    const auto at = [&](int i) -> const Candidate& { return candidates[static_cast<std::size_t>(crease(i))]; };
+    const auto sort = [&](int fields) {
+        grid.sort(static_cast<int>(creases.size()), fields, at,
+                  [&](std::int32_t i, std::int32_t) { return crease(i); });
+    };
     for (const double max_spreads : alignments) {
         if (!aligned) break;
-        grid.sort(candidates, first_field);
+        sort(first_field);
         grid.for_each_near([&](std::size_t i, const NeighbourGrid::Near& near) {
             align(candidates[i], near, frame, options.max_shift, max_spreads);
         });
     }
     if (!options.normals) return;
-    sort_with_tangents(candidates, grid);
+    sort(tangent_fields);
+    fill_tangents(candidates, grid);
     grid.for_each_near([&](std::size_t i, const NeighbourGrid::Near& near) {
-        Candidate& c = candidates[i];
-        const double angle = c.crease > 0 ? normal_angle(near, frame.projective) : -1;
-        if (angle >= 0) c.crease = static_cast<float>(angle);
+        const double angle = normal_angle(near, frame.projective);
+        if (angle >= 0) candidates[i].crease = static_cast<float>(angle);
     });
 }
 
-template void join_neighbours(std::vector<Candidate>&, const Frame<float>&, const ScanLineOptions&, Team&,
-                              std::vector<Candidate>*);
-template void join_neighbours(std::vector<Candidate>&, const Frame<double>&, const ScanLineOptions&, Team&,
-                              std::vector<Candidate>*);
+#define RANGEEDGE_INSTANTIATE(T)                                                                                    \
+    template void join_neighbours(std::vector<Candidate>&, NeighbourGrid&, const Frame<T>&, const ScanLineOptions&, \
+                                  std::vector<Candidate>*);
+RANGEEDGE_INSTANTIATE(float)
+RANGEEDGE_INSTANTIATE(double)
 
 }  // namespace rangeedge

@@ -13,16 +13,19 @@
 #pragma once
 #include <vector>
 
-#include "base/parallel.hpp"
 #include "edges/candidate.hpp"
+#include "edges/neighbourhood.hpp"
 #include "image/frame.hpp"
 #include "scanline/options.hpp"
 
 namespace rangeedge {
 
-// `weak`, unless null, receives those dropped.
+// Candidates in the order of their places, which they are numbered by as they come; `grid` has room for what follows.
+std::vector<Candidate> in_place(const std::vector<const Candidate*>& found, NeighbourGrid& grid);
+
+// `grid` is as `in_place` leaves it. `weak`, unless null, receives those dropped.
 template <class T>
-void join_neighbours(std::vector<Candidate>& candidates, const Frame<T>& frame, const ScanLineOptions& options,
-                     Team& team, std::vector<Candidate>* weak);
+void join_neighbours(std::vector<Candidate>& candidates, NeighbourGrid& grid, const Frame<T>& frame,
+                     const ScanLineOptions& options, std::vector<Candidate>* weak);
 
 }  // namespace rangeedge

@@ -27,8 +27,9 @@ enum TangentField {
     slope_after,
     value_before,
     value_after,
-    fields
+    end_of_fields
 };
+static_assert(end_of_fields == tangent_fields);
 
 // For the gradient of a surface's ordinate from slopes along several directions, by weighted least squares.
 struct GradientSums {
@@ -108,8 +109,7 @@ double normal_angle(const NeighbourGrid::Near& near, bool projective) {
     return angle_between(std::sqrt(x * x + y * y + z * z), dot);
 }
 
-void sort_with_tangents(const std::vector<Candidate>& candidates, NeighbourGrid& grid) {
-    grid.sort(candidates, fields);
+void fill_tangents(const std::vector<Candidate>& candidates, NeighbourGrid& grid) {
     grid.for_each([&](std::size_t i, std::ptrdiff_t k) {
         const Candidate& c = candidates[i];
         // Zero times infinity would spoil sums in which a candidate has no weight.

@@ -14,8 +14,9 @@
 
 namespace rangeedge {
 
-// Fills the grid with candidates and what `normal_angle` asks of them.
-void sort_with_tangents(const std::vector<Candidate>& candidates, NeighbourGrid& grid);
+// Fills the fields of a grid, of which there are `tangent_fields`, with what `normal_angle` asks of its candidates.
+constexpr int tangent_fields = first_field + 10;
+void fill_tangents(const std::vector<Candidate>& candidates, NeighbourGrid& grid);
 
 // In degrees; negative where the neighbours do not fix it.
 double normal_angle(const NeighbourGrid::Near& near, bool projective);

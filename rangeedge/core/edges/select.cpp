@@ -3,15 +3,44 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <limits>
 #include <vector>
 
+#include "base/simd.hpp"
 #include "base/watch.hpp"
+#include "edges/candidate.hpp"
 #include "image/components.hpp"
 
 namespace rangeedge {
 namespace {
 
+constexpr int company = 4;           // creases of the nine pixels around one that stays, itself among them
 constexpr double usual_length = 10;  // of the line whose significance is that of its pixels
+
+// The least strength that reaches a threshold, which may be 0 or more than a float holds.
+float least_reaching(double threshold) {
+    using Limits = std::numeric_limits<float>;
+    if (threshold > static_cast<double>(Limits::max())) return Limits::infinity();
+    return std::max(static_cast<float>(threshold), Limits::denorm_min());
+}
+
+RANGEEDGE_WIDE void flag_reaching(const float* strength, int n, float least, std::uint8_t* flags) {
+    for (int i = 0; i < n; ++i) flags[i] = strength[i] >= least;
+}
+
+// `flags` may be read one before and after.
+RANGEEDGE_WIDE void count_in_row(const std::uint8_t* flags, int n, std::uint8_t* counts) {
+    for (int i = 0; i < n; ++i) counts[i] = static_cast<std::uint8_t>(flags[i - 1] + flags[i] + flags[i + 1]);
+}
+
+RANGEEDGE_WIDE void select_in_row(const std::uint8_t* jumps, const std::uint8_t* kind, const std::uint8_t* creases,
+                                  const std::uint8_t* above, const std::uint8_t* here, const std::uint8_t* below, int n,
+                                  std::uint8_t* edges) {
+    for (int i = 0; i < n; ++i) {
+        const int nearer = (kind[i] & occluding_bit) != 0, joined = above[i] + here[i] + below[i] >= company;
+        edges[i] = static_cast<std::uint8_t>((jumps[i] & nearer) | (creases[i] & joined));
+    }
+}
 
 // An edge map, 0 and 1, with the margin of one pixel that components need.
 struct EdgeMap {
@@ -101,6 +130,41 @@ void drop_faint(EdgeMap& edges, const float* significance, double least) {
 }
 
 }  // namespace
+
+void select_pixels(const Strengths& strengths, const Thresholds& thresholds, Team& team, std::uint8_t* edges) {
+    const int rows = strengths.rows, cols = strengths.cols;
+    const float least_jump = least_reaching(thresholds.jump), least_crease = least_reaching(thresholds.crease);
+    const float least_company = least_reaching(thresholds.company);
+    const bool alone = !strengths.kind || std::min(rows, cols) < 3;
+    const auto width = static_cast<std::size_t>(cols) + 2;
+    const std::vector<std::uint8_t> every_kind(strengths.kind ? 0 : width, occluding_bit);
+    parallel_for(rows, team, [&](int begin, int end, int) {
+        // Of a row: jumps and creases that reach their threshold, and company with a column more on either side; of
+        // three rows, the last one counted and the two before it, the company of each pixel and those beside it.
+        std::vector<std::uint8_t> jumps(width), creases(width), flags(width, 0);
+        std::vector<std::uint8_t> counts(3 * width, alone ? company : 0);
+        const auto counts_of = [&](int row) { return counts.data() + static_cast<std::size_t>((row + 3) % 3) * width; };
+        const auto at = [&](int row) { return static_cast<std::ptrdiff_t>(row) * cols; };
+        const auto count = [&](int row) {
+            if (alone) return;
+            if (row < 0 || row == rows) {
+                std::fill_n(counts_of(row), width, std::uint8_t{0});
+                return;
+            }
+            flag_reaching(strengths.crease + at(row), cols, least_company, flags.data() + 1);
+            if (strengths.wrap) flags.front() = flags[width - 2], flags.back() = flags[1];
+            count_in_row(flags.data() + 1, cols, counts_of(row));
+        };
+        count(begin - 1), count(begin);
+        for (int row = begin; row < end; ++row) {
+            count(row + 1);
+            flag_reaching(strengths.jump + at(row), cols, least_jump, jumps.data());
+            flag_reaching(strengths.crease + at(row), cols, least_crease, creases.data());
+            select_in_row(jumps.data(), strengths.kind ? strengths.kind + at(row) : every_kind.data(), creases.data(),
+                          counts_of(row - 1), counts_of(row), counts_of(row + 1), cols, edges + at(row));
+        }
+    });
+}
 
 void keep_lines(const std::uint8_t* edges, int rows, int cols, bool wrap, int min_length, const float* significance,
                 double least_significance, std::uint8_t* kept) {

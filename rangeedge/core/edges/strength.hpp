@@ -132,6 +132,14 @@ inline double crease_strength(const EdgeSide& f1, const EdgeSide& f2) {
     return angle_between(cross(f1.tangent, f2.tangent), dot(f1.tangent, f2.tangent));
 }
 
+// False where that is plainly less than so many degrees: an angle is less than its tangent.
+inline bool may_exceed(const EdgeSide& f1, const EdgeSide& f2, double degrees) {
+    constexpr double rounding = 1.001;
+    const double along = dot(f1.tangent, f2.tangent);
+    return !(along > 0) ||
+           !(std::abs(cross(f1.tangent, f2.tangent)) * (rounding * degrees_per_radian) < degrees * along);
+}
+
 // f1' > f2': on a grid, with the tangents (1, -f1') and (1, -f2'), their cross product is f1' - f2'.
 inline bool is_convex(const EdgeSide& f1, const EdgeSide& f2) { return cross(f1.tangent, f2.tangent) > 0; }
 

@@ -29,64 +29,10 @@
 #include <vector>
 
 #include "base/watch.hpp"
+#include "edges/ring.hpp"
 
 namespace rangeedge {
 namespace {
-
-// ---- What the eight neighbours of a pixel say ----
-
-// Bits of a byte: east, northeast, north, and so on around; the even ones are the 4-neighbours.
-using Ring = unsigned;
-constexpr Ring four = 0x55, diagonal = 0xaa;
-constexpr int east = 0, north = 2, west = 4, south = 6;
-
-// The ring turned: what lies `steps` bits further around every neighbour.
-constexpr Ring turned(Ring ring, int steps) { return (ring >> steps | ring << (8 - steps)) & 255u; }
-
-constexpr int count(Ring ring) {
-    int bits = 0;
-    for (; ring; ring &= ring - 1) ++bits;
-    return bits;
-}
-
-struct Kind {
-    std::uint8_t neighbours;
-    bool simple;
-
-    constexpr bool may_go() const { return simple && neighbours > 1; }  // an end of a line may not
-};
-
-constexpr std::array<Kind, 256> list_kinds() {
-    std::array<Kind, 256> kinds{};
-    for (Ring on = 0; on < 256; ++on) {
-        // Yokoi's connectivity number: into how many parts the neighbours fall; 0 inside and of a lone pixel.
-        const int parts = count(~on & (turned(on, 1) | turned(on, 2)) & four);
-        kinds[on] = {static_cast<std::uint8_t>(count(on)), parts == 1};
-    }
-    return kinds;
-}
-constexpr std::array<Kind, 256> kinds = list_kinds();
-
-// Whether a pixel, seen `from` a side that is open, lies beside a line which runs past it on the other side.
-constexpr bool lies_beside_line(Ring on, int from) {
-    const Ring ahead = turned(on, (from + 4) & 7);  // east is now the pixel ahead
-    return (ahead & 1) && (ahead & 0x06) && (ahead & 0xc0);
-}
-
-// Whether a candidate belongs to a clique of which a pixel must stay. `on` are the neighbours that are set,
-// `candidates` those of them that would go with it.
-constexpr bool is_crucial(Ring on, Ring candidates) {
-    // A pair of 4-neighbours: what touches their common side must do so at one of its two ends.
-    const Ring left = turned(on, 1) | turned(on, 2), right = turned(on, 7) | turned(on, 6);
-    const Ring pairs = candidates & ~(left ^ right) & four;
-    // A square of which two pixels across, three or all are set, none of them to stay.
-    const Ring stay = on & ~candidates;
-    const Ring squares =
-        (on | (turned(on, 1) & turned(on, 7))) & ~(stay | turned(stay, 1) | turned(stay, 7)) & diagonal;
-    return pairs | squares;
-}
-
-// ---- The four steps ----
 
 class Thinner {
 public:
@@ -105,7 +51,7 @@ public:
     }
 
     void peel() {
-        std::vector<int> border, next;
+        std::vector<int> border, candidates, gone, next;
         std::size_t enclosed = 0;  // pixels that have not been border yet
         for_each_set([&](int p) {
             if (is_border(p))
@@ -121,26 +67,23 @@ public:
                 const bool goes = kinds[ring<on>(p)].may_go() && !(state_[at(p)] & stays);
                 state_[at(p)] |= goes ? candidate : line;
             }
+            candidates.clear();
+            append_if(border, candidates, [&](int p) { return (state_[at(p)] & candidate) != 0; });
             next.clear();
-            for (const int p : border)
-                if (state_[at(p)] & candidate && is_crucial(ring<on>(p), ring<candidate>(p))) next.push_back(p);
+            append_if(candidates, next, [&](int p) { return is_crucial(ring<on>(p), ring<candidate>(p)); });
             for (const int p : next) state_[at(p)] = on | line;
+            append_if(border, lines_, [&](int p) { return (state_[at(p)] & line) != 0; });
+            gone.clear();
+            append_if(candidates, gone, [&](int p) { return !(state_[at(p)] & line); });
+            for (const int p : gone) state_[at(p)] = 0;
             next.clear();
-            for (const int p : border) {
-                if (state_[at(p)] & line)
-                    lines_.push_back(p);
-                else
-                    state_[at(p)] = 0;
-            }
-            for (const int p : border) {
-                if (is_set(p)) continue;
+            for (const int p : gone)
                 for (const int from : {east, north, west, south}) {
                     const int q = p + offsets_[at(from)];
                     if ((state_[at(q)] & (on | line | queued)) != on) continue;
                     state_[at(q)] |= queued;
                     next.push_back(q);
                 }
-            }
             enclosed -= next.size();
             border.swap(next);
         }
@@ -196,6 +139,18 @@ private:
     }
     int count_neighbours(int p) const { return kinds[ring<on>(p)].neighbours; }
 
+    // Appends those pixels that are wanted; no branch says which, as none could be predicted.
+    template <class F>
+    static void append_if(const std::vector<int>& pixels, std::vector<int>& to, F&& wanted) {
+        std::size_t count = to.size();
+        to.resize(count + pixels.size());
+        for (const int p : pixels) {
+            to[count] = p;
+            count += wanted(p);
+        }
+        to.resize(count);
+    }
+
     template <class F>
     void for_each_set(F&& f) const {
         const int end = static_cast<int>(state_.size());
@@ -243,8 +198,8 @@ private:
             group.swap(by_depth_[least]);
             for (const int from : {south, north, east, west}) {
                 side.clear();
-                for (const int p : group)
-                    if (!is_set(p + offsets_[at(from)]) && from_here(ring<on>(p), from)) side.push_back(p);
+                append_if(group, side,
+                          [&](int p) { return !is_set(p + offsets_[at(from)]) & from_here(ring<on>(p), from); });
                 for (const int p : side) {
                     checkpoints_.pass();
                     if (!is_set(p) || !kinds[ring<on>(p)].may_go()) continue;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "base/parallel.hpp"
@@ -30,6 +31,8 @@ constexpr double median_magnitude = 0.67449;  // of a normal variable, where a m
 constexpr double residual_factor = 1.25;  // for what the curves of splitting, through three samples, are off themselves
 constexpr double most_residual = 12;      // times the factor on slopes of the shortest fits
 
+using FoundSteps = std::optional<DirectionSteps>[2];  // along rows, and along columns
+
 // The ordinate and the size of a step.
 struct Size {
     double ordinate, slope;
@@ -49,11 +52,11 @@ void put_in_bins(std::vector<Size>& sizes, std::size_t first, std::size_t last) 
 }
 
 // How the deviation of |D| for n = 16 grows with depth, in units of `single` on the whole.
-Deviation waves_of(const DirectionSteps* found, bool projective, const Deviation& single) {
+Deviation waves_of(const FoundSteps& found, bool projective, const Deviation& single) {
     if (!projective) return single;
     std::vector<Size> steps;
     for (int direction = 0; direction < 2; ++direction) {
-        const Steps& own = found[direction].single[wave_level];
+        const Steps& own = found[direction]->single[wave_level];
         for (std::size_t i = 0; i < own.size(); ++i) steps.push_back({own.ordinate[i], std::abs(own.slope[i])});
     }
     if (steps.size() < depth_bins * least_in_bin) return single;
@@ -122,17 +125,23 @@ void write_fit_noise(const DirectionSteps& found, Measure& measure, bool silent,
 template <class T>
 FitNoiseEstimate fit_noise(const T* ordinate, int rows, int cols, bool projective, const Deviation& single, bool silent,
                            Team& team) {
-    DirectionSteps found[2] = {{ordinate, rows, cols, cols, 1, silent}, {ordinate, cols, rows, 1, cols, silent}};
+    FoundSteps found;
     parallel_for(2, team, [&](int begin, int end, int) {
         Measure measure(single, single, projective);
-        for (int i = begin; i < end; ++i) found[i].look(measure);
+        for (int i = begin; i < end; ++i) {
+            if (i == 0)
+                found[0].emplace(ordinate, rows, cols, cols, 1, silent);
+            else
+                found[1].emplace(ordinate, cols, rows, 1, cols, silent);
+            found[i]->look(measure);
+        }
     });
     FitNoiseEstimate estimate{};
     estimate.waves = waves_of(found, projective, single);
     double* const numbers[2] = {estimate.rows, estimate.cols};
     parallel_for(2, team, [&](int begin, int end, int) {
         Measure measure(single, estimate.waves, projective);
-        for (int i = begin; i < end; ++i) write_fit_noise(found[i], measure, silent, numbers[i]);
+        for (int i = begin; i < end; ++i) write_fit_noise(*found[i], measure, silent, numbers[i]);
     });
     return estimate;
 }

@@ -54,6 +54,17 @@ struct Windows {
         }
     }
 
+    void add(const Windows& others) {
+        reserve(others.count);
+        const auto append = [&](std::vector<float>& values, const std::vector<float>& more) {
+            std::copy_n(more.begin(), others.count, values.begin() + static_cast<std::ptrdiff_t>(count));
+        };
+        append(differences, others.differences);
+        append(ordinates, others.ordinates);
+        append(steps, others.steps);
+        count += others.count, constant += others.constant, changing_twice += others.changing_twice;
+    }
+
 private:
     // Marks the windows in the middle of constant runs, and those that have a sample of a long one.
     template <class T>
@@ -103,14 +114,15 @@ std::vector<int> sampled(int lines, int every) {
 }
 
 template <class T>
-Windows windows_of(const T* ordinate, int rows, int cols, int apart, bool counts_constant) {
-    const int every = 1 + static_cast<int>(static_cast<std::int64_t>(rows) * cols / most_windows);
-    Windows windows;
-    windows.counts_constant = counts_constant;
+void add_rows(const T* ordinate, int rows, int cols, int every, int apart, Windows& windows) {
     for (const int v : sampled(rows, every)) {
         Watch::checkpoint();
         windows.add_line(ordinate + static_cast<std::ptrdiff_t>(v) * cols, cols, apart);
     }
+}
+
+template <class T>
+void add_columns(const T* ordinate, int rows, int cols, int every, int apart, Windows& windows) {
     // Columns are copied, several at a time, since the image lies row by row.
     const std::vector<int> columns = sampled(cols, every);
     std::vector<T> copies(columns.size() * static_cast<std::size_t>(rows));
@@ -124,6 +136,21 @@ Windows windows_of(const T* ordinate, int rows, int cols, int apart, bool counts
         Watch::checkpoint();
         windows.add_line(copies.data() + i * static_cast<std::size_t>(rows), rows, apart);
     }
+}
+
+// Those along rows, and then those along columns.
+template <class T>
+Windows windows_of(const T* ordinate, int rows, int cols, int apart, bool counts_constant, Team& team) {
+    const int every = 1 + static_cast<int>(static_cast<std::int64_t>(rows) * cols / most_windows);
+    Windows windows, along_columns;
+    windows.counts_constant = along_columns.counts_constant = counts_constant;
+    parallel_each(2, team, [&](int i, int) {
+        if (i == 0)
+            add_rows(ordinate, rows, cols, every, apart, windows);
+        else
+            add_columns(ordinate, rows, cols, every, apart, along_columns);
+    });
+    windows.add(along_columns);
     return windows;
 }
 
@@ -188,7 +215,7 @@ SingleNoise single_noise(const T* ordinate, int rows, int cols, bool by_ordinate
     Windows windows;
     int apart = 1;
     for (int next = 1; next <= farthest && windows.count < fewest_windows; ++next) {
-        Windows found = windows_of(ordinate, rows, cols, next, false);
+        Windows found = windows_of(ordinate, rows, cols, next, false, team);
         if (found.count > windows.count || next == 1) windows = std::move(found), apart = next;
     }
     if (windows.count == 0) return result;
@@ -199,7 +226,7 @@ SingleNoise single_noise(const T* ordinate, int rows, int cols, bool by_ordinate
     };
     extremes();
     if (is_exact(windows, result.highest - result.lowest)) {
-        windows = windows_of(ordinate, rows, cols, apart, true);
+        windows = windows_of(ordinate, rows, cols, apart, true, team);
         extremes();
         windows.steps.assign(windows.steps.size(), 0.0f);
     }

@@ -1,10 +1,11 @@
-// Edge candidates as Python takes them.
+// Edge candidates as Python takes them, and the maps made of them.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <type_traits>
 #include <vector>
 
 #include "edges/candidate.hpp"
+#include "edges/combine.hpp"
 #include "python/arrays.hpp"
 
 namespace rangeedge::python {
@@ -32,6 +33,12 @@ inline Columns columns(const std::vector<Candidate>& candidates) {
     add("before", &Candidate::before);
     add("after", &Candidate::after);
     return result;
+}
+
+// The maps of edges that Python hands over.
+inline EdgeMaps maps_of(const OutImage<float>& jump, const OutImage<float>& crease, const OutImage<std::uint8_t>& kind,
+                        const OutImage<float>& significance) {
+    return {static_cast<std::int32_t>(jump.size()), jump.data(), crease.data(), kind.data(), significance.data()};
 }
 
 }  // namespace rangeedge::python

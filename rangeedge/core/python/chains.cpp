@@ -4,9 +4,9 @@
 
 #include <nanobind/stl/pair.h>
 
-#include "edges/combine.hpp"
 #include "edges/detect.hpp"
 #include "image/pixels.hpp"
+#include "python/candidates.hpp"
 #include "python/frame.hpp"
 
 namespace rangeedge::python {
@@ -24,7 +24,7 @@ BoundCandidates keep_candidates(const BoundFrame& bound, const ScanLineOptions& 
         [&](const auto& frame) {
             Team team = team_for(bound, threads);
             BoundCandidates found{find_candidates(frame, options, team)};
-            combine(found.all, {jump.data(), crease.data(), kind.data(), significance.data()}, team);
+            combine(found.all, maps_of(jump, crease, kind, significance), team);
             mark_boundary(frame, boundary_bit, kind.data(), team);
             return found;
         },

@@ -5,9 +5,9 @@
 
 #include "cleaning/holes.hpp"
 #include "cleaning/smooth.hpp"
-#include "edges/combine.hpp"
 #include "edges/detect.hpp"
 #include "image/pixels.hpp"
+#include "python/candidates.hpp"
 #include "python/frame.hpp"
 
 namespace rangeedge::python {
@@ -20,8 +20,8 @@ void edge_strength_and_flying(const BoundFrame& bound, const ScanLineOptions& op
     std::visit(
         [&](const auto& frame) {
             Team team = team_for(bound, threads);
-            combine(find_candidates(frame, options, team, flying.data()),
-                    {jump.data(), crease.data(), kind.data(), significance.data()}, team);
+            combine(find_candidates(frame, options, team, flying.data()), maps_of(jump, crease, kind, significance),
+                    team);
             mark_boundary(frame, boundary_bit, kind.data(), team);
         },
         bound.frame);

@@ -1,7 +1,10 @@
 // Scan lines and edges.
 // SPDX-License-Identifier: Apache-2.0
+#include <nanobind/stl/array.h>
+
+#include <array>
+
 #include "base/simd.hpp"
-#include "edges/combine.hpp"
 #include "edges/detect.hpp"
 #include "edges/select.hpp"
 #include "edges/thin.hpp"
@@ -56,7 +59,7 @@ std::vector<Candidate> fill(const BoundFrame& bound, const ScanLineOptions& opti
 
 void edge_strength(const BoundFrame& frame, const ScanLineOptions& options, int threads, const Strengths& jump,
                    const Strengths& crease, const OutImage<std::uint8_t>& kind, const Strengths& significance) {
-    fill(frame, options, threads, {jump.data(), crease.data(), kind.data(), significance.data()});
+    fill(frame, options, threads, maps_of(jump, crease, kind, significance));
 }
 
 Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads,
@@ -65,7 +68,7 @@ Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOpti
     std::vector<Candidate> candidates;
     {
         const Unlock unlock;
-        candidates = fill(frame, options, threads, {jump.data(), crease.data(), kind.data(), significance.data()});
+        candidates = fill(frame, options, threads, maps_of(jump, crease, kind, significance));
         put_in_order(candidates);
     }
     return columns(candidates);
@@ -75,6 +78,14 @@ void flying_pixels(const BoundFrame& bound, const ScanLineOptions& options, int 
                    const OutImage<std::uint8_t>& flying) {
     Team team = team_for(bound, threads);
     std::visit([&](const auto& frame) { find_candidates(frame, options, team, flying.data()); }, bound.frame);
+}
+
+void bound_select_pixels(const Image<float>& jump, const Image<float>& crease, const Image<std::uint8_t>& kind,
+                         const std::array<double, 3>& thresholds, bool wrap, int threads,
+                         const OutImage<std::uint8_t>& edges) {
+    Team team(threads);
+    const rangeedge::Strengths strengths{jump.data(), crease.data(), kind.data(), rows(jump), cols(jump), wrap};
+    select_pixels(strengths, {thresholds[0], thresholds[1], thresholds[2]}, team, edges.data());
 }
 
 void bound_keep_lines(const Image<std::uint8_t>& edges, bool wrap, int min_length, const Image<float>& significance,
@@ -108,6 +119,8 @@ void bind_edges(nb::module_& m) {
     m.def("flying_pixels", &flying_pixels, "frame"_a, "options"_a, "threads"_a, array("flying"), Unlocked());
     m.def("thin_lines", &thin_to_lines, array("edges"), optional_array("preferred"), "spur_length"_a, array("thin"),
           Unlocked());
+    m.def("select_pixels", &bound_select_pixels, array("jump"), array("crease"), optional_array("kind"), "thresholds"_a,
+          "wrap"_a, "threads"_a, array("edges"), Unlocked());
     m.def("keep_lines", &bound_keep_lines, array("edges"), "wrap"_a, "min_length"_a, optional_array("significance"),
           "least_significance"_a, array("kept"), Unlocked());
 }

@@ -1,6 +1,7 @@
 // Outlines of regions, and the surfaces that they lie on.
 // SPDX-License-Identifier: Apache-2.0
 #include "regions/outlines.hpp"
+#include "regions/crossings.hpp"
 
 #include <nanobind/stl/tuple.h>
 
@@ -42,6 +43,22 @@ void bound_simplify_lines(const Image<double>& points, const Values<std::int32_t
     simplify_lines(points.data(), lines, kept.data());
 }
 
+// 1 at every point of lines from which a segment leads to the next that crosses another.
+void bound_find_crossings(const Image<double>& points, const Values<std::int32_t>& counts,
+                          const OutValues<std::uint8_t>& crossing) {
+    std::vector<PlaneSegment> segments;
+    std::vector<std::int64_t> starts;
+    std::int64_t first = 0;
+    for (std::size_t i = 0; i < counts.shape(0); first += counts.data()[i++])
+        for (std::int64_t k = first; k + 1 < first + counts.data()[i]; ++k) {
+            const double *const from = points.data() + 2 * k, *const to = from + 2;
+            segments.push_back({{from[0], from[1]}, {to[0], to[1]}});
+            starts.push_back(k);
+        }
+    const std::vector<std::uint8_t> found = find_crossings(segments);
+    for (std::size_t i = 0; i < starts.size(); ++i) crossing.data()[starts[i]] = found[i];
+}
+
 // For every label the origin (x0, y0), the six coefficients, the rms, and whether it is curved.
 void bound_fit_surfaces(const Image<float>& ordinate, const Image<float>& x, const Image<float>& y,
                         const Image<std::int32_t>& labels, const OutImage<double>& surfaces) {
@@ -60,6 +77,7 @@ void bind_outlines(nb::module_& m) {
     m.def("trace_outlines", &bound_trace_outlines, array("labels"));
     m.def("simplify_lines", &bound_simplify_lines, array("points"), array("counts"), array("tolerances"), array("kept"),
           Unlocked());
+    m.def("find_crossings", &bound_find_crossings, array("points"), array("counts"), array("crossing"), Unlocked());
     m.def("fit_surfaces", &bound_fit_surfaces, array("ordinate"), optional_array("x"), optional_array("y"),
           array("labels"), array("surfaces"), Unlocked());
 }

@@ -119,6 +119,7 @@ Border Adjacency::measure(const Section& section, const Patch& a, const Patch& b
         const auto [gap, cosine] = image.continuation(c.p, c.q, a.surface, b.surface);
         border.smooth += gap <= smooth_gap && cosine >= least_cosine;
         border.similar += gap <= similar_gap && cosine >= rough;
+        border.joined += open && gap <= similar_gap;
     }
     return border;
 }
@@ -151,7 +152,7 @@ const std::vector<Adjacency::Neighbours>& Adjacency::update() {
         Border& sum = neighbours_[static_cast<std::size_t>(pair)].border;
         const Border& part = sections_[k].border;
         sum.pixels += part.pixels, sum.open += part.open;
-        sum.smooth += part.smooth, sum.similar += part.similar;
+        sum.smooth += part.smooth, sum.similar += part.similar, sum.joined += part.joined;
     }
     std::sort(neighbours_.begin(), neighbours_.end(), [](const Neighbours& m, const Neighbours& n) {
         return std::make_pair(-m.border.pixels, std::make_pair(m.a, m.b)) <

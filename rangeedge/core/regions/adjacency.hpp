@@ -15,6 +15,7 @@ struct Border {
     int open = 0;     // without an edge
     int smooth = 0;   // of the open ones, where both surfaces agree
     int similar = 0;  // of the open ones, where they agree roughly
+    int joined = 0;   // of the open ones, where they meet, under any angle
 };
 
 struct Tolerance {

@@ -16,6 +16,8 @@ constexpr double small_share = 0.2;      // a patch is small beside one so many 
 constexpr double most_of_border = 0.6;   // share of its pixels
 constexpr double least_border = 0.6;     // in widths of the smaller patch
 constexpr double longest_bend = 1.3;     // border of a bend, in roots of its area
+constexpr double least_strip = 16;       // widths around a strip, as around 6 squares in a row
+constexpr double longest_end = 2.5;      // border of two strips end to end, in widths
 constexpr int most_rounds = 12;          // of merging
 constexpr double strip_openness = 0.2;   // share of the border of a strip that is no edge
 constexpr double strip_explained = 0.7;  // share of its pixels that lie on neighbouring surfaces
@@ -39,11 +41,23 @@ bool is_bend(const Patch& patch, const Border& border) {
            border.pixels < longest_bend * std::sqrt(static_cast<double>(patch.count()));
 }
 
+double width_of(const Patch& patch, int perimeter) { return 2.0 * patch.count() / std::max(perimeter, 1); }
+
+// Whether two strips meet end to end, with nothing between them: one that turns a corner, where it is too narrow for a
+// surface of its own.
+bool meet_end_to_end(const Patch& a, int around_a, const Patch& b, int around_b, const Border& border) {
+    const auto ends_at = [&](const Patch& patch, int around) {
+        const double width = width_of(patch, around);
+        return width * width < least_curved && around > least_strip * width && border.pixels < longest_end * width &&
+               border.pixels > least_border * width;
+    };
+    return border.joined > most_of_border * border.pixels && ends_at(a, around_a) && ends_at(b, around_b);
+}
+
 // Whether the smaller of two patches goes on into the larger: for most of a border that is not much shorter than the
 // smaller one is wide.
 bool continues(const Patch& small, const Patch& large, const Border& border, int perimeter) {
-    const double width = 2.0 * small.count() / std::max(perimeter, 1);
-    if (border.pixels < least_border * width) return false;
+    if (border.pixels < least_border * width_of(small, perimeter)) return false;
     return (is_small(small, large) ? border.similar : border.smooth) > most_of_border * border.pixels;
 }
 
@@ -68,7 +82,9 @@ void merge(PatchMap& patches, Adjacency& adjacency) {
                 patches.join_surfaces(a, b);
                 refitted[a] = refitted[b] = 1;
                 adjacency.has_changed(a), adjacency.has_changed(b);
-            } else if (!refitted[a] && !refitted[b] && continues(small, large, found.border, adjacency.perimeter(b))) {
+            } else if (!refitted[a] && !refitted[b] &&
+                       (continues(small, large, found.border, adjacency.perimeter(b)) ||
+                        meet_end_to_end(large, adjacency.perimeter(a), small, adjacency.perimeter(b), found.border))) {
                 small.absorbed = is_small(small, large) && !is_bend(small, found.border);
                 patches.join_regions(a, b);
             } else {

@@ -7,7 +7,9 @@
 #include <utility>
 
 #include "base/array.hpp"
+#include "base/disjoint_sets.hpp"
 #include "base/watch.hpp"
+#include "regions/crossings.hpp"
 
 namespace rangeedge {
 namespace {
@@ -20,35 +22,51 @@ class RegionMap {
 public:
     RegionMap(const std::int32_t* labels, int rows, int cols, std::vector<std::int32_t>& names)
         : stride_(cols + 2), region_(static_cast<Array<std::int32_t>::Index>(rows + 2) * (cols + 2), 0) {
-        names.assign(1, 0);
-        Array<std::int32_t> label = region_;  // with the same margin
-        for (int row = 0; row < rows; ++row)
-            std::copy_n(labels + static_cast<std::ptrdiff_t>(row) * cols, cols, &label[(row + 1) * stride_ + 1]);
-        std::vector<int> open;
-        Checkpoints checkpoints;
-        for (int p = stride_; p < label.count() - stride_; ++p) {
-            if (region_[p] || label[p] <= 0) continue;
-            const auto region = static_cast<std::int32_t>(names.size());
-            region_[p] = region;
-            open.push_back(p);
-            while (!open.empty()) {
-                checkpoints.pass();
-                const int q = open.back();
-                open.pop_back();
-                for (const int step : {1, -1, stride_, -stride_})
-                    if (!region_[q + step] && label[q + step] == label[p]) {
-                        region_[q + step] = region;
-                        open.push_back(q + step);
-                    }
+        DisjointSets parts(1);  // pixels that touch above or on the left; the first represents a region
+        names.assign(1, 0);     // of parts, then of regions
+        for (int row = 0; row < rows; ++row) {
+            Watch::checkpoint();
+            const std::int32_t* label = labels + static_cast<std::ptrdiff_t>(row) * cols;
+            std::int32_t* part = &region_[static_cast<std::ptrdiff_t>(row + 1) * stride_ + 1];
+            for (int col = 0; col < cols; ++col) {
+                if (label[col] <= 0) continue;
+                const std::int32_t left = col > 0 && label[col - 1] == label[col] ? part[col - 1] : 0;
+                const std::int32_t above = row > 0 && label[col - cols] == label[col] ? part[col - stride_] : 0;
+                part[col] = left ? left : above;
+                if (!part[col]) {
+                    part[col] = parts.add();
+                    names.push_back(label[col]);
+                } else if (left && above && left != above) {
+                    const int i = parts.find(left), j = parts.find(above);
+                    parts.link(std::max(i, j), std::min(i, j));
+                }
             }
-            names.push_back(label[p]);
         }
+        std::vector<std::int32_t> number(names.size(), 0);
+        std::size_t count = 1;
+        for (std::size_t part = 1; part < number.size(); ++part) {
+            const int root = parts.find(static_cast<int>(part));
+            if (root == static_cast<int>(part)) {
+                number[part] = static_cast<std::int32_t>(count);
+                names[count++] = names[part];
+            } else {
+                number[part] = number[static_cast<std::size_t>(root)];
+            }
+        }
+        names.resize(count);
+        for (std::int32_t& region : region_) region = number[static_cast<std::size_t>(region)];
     }
 
     // The region of the pixel behind a corner on the right of one who leaves it that way, and on the left.
     std::int32_t right_of(int x, int y, int way) const { return at(x - (way == 1 || way == 2), y - (way >= 2)); }
     std::int32_t left_of(int x, int y, int way) const { return at(x - (way >= 2), y - (way == 0 || way == 3)); }
     bool border(int x, int y, int way) const { return right_of(x, y, way) != left_of(x, y, way); }
+    // Whether all four pixels around a corner are of one region.
+    bool amid(int x, int y) const {
+        const std::int32_t* above = &region_[static_cast<std::ptrdiff_t>(y) * stride_ + x];
+        const std::int32_t* below = above + stride_;
+        return above[0] == above[1] && above[0] == below[0] && above[0] == below[1];
+    }
 
 private:
     std::int32_t at(int col, int row) const { return region_[(row + 1) * stride_ + col + 1]; }
@@ -64,23 +82,27 @@ public:
           done_(static_cast<Array<std::uint8_t>::Index>(rows + 1) * (cols + 1), 0) {}
 
     Outlines trace() {
-        for_corners([&](int x, int y) {
+        std::vector<std::array<int, 2>> corners;
+        for (int y = 0; y <= rows_; ++y) {
+            Watch::checkpoint();
+            for (int x = 0; x <= cols_; ++x)
+                if (!map_.amid(x, y)) corners.push_back({x, y});
+        }
+        Checkpoints checkpoints;
+        for (const auto& [x, y] : corners) {
+            checkpoints.pass();
             if (ways_from(x, y) > 2)
                 for (int way = 0; way < 4; ++way) follow(x, y, way);
-        });
-        for_corners([&](int x, int y) { follow(x, y, 0); });  // what is left has no end; it goes east somewhere
+        }
+        for (const auto& [x, y] : corners) {  // what is left has no end; it goes east somewhere
+            checkpoints.pass();
+            follow(x, y, 0);
+        }
         link();
         return std::move(found_);
     }
 
 private:
-    template <class F>
-    void for_corners(F&& visit) const {
-        for (int y = 0; y <= rows_; ++y) {
-            Watch::checkpoint();
-            for (int x = 0; x <= cols_; ++x) visit(x, y);
-        }
-    }
     bool inside(int x, int y) const { return x >= 0 && y >= 0 && x <= cols_ && y <= rows_; }
     bool open(int x, int y, int way) const {
         const auto k = static_cast<std::size_t>(way);
@@ -203,36 +225,65 @@ double squared_distance(const double* p, const double* a, const double* b) {
     return (u - along * x) * (u - along * x) + (v - along * y) * (v - along * y);
 }
 
+// Of the points between two, the one farthest from the line through these; the first of them if all lie on it.
+struct Farthest {
+    std::int64_t index;
+    double square;  // of its distance
+};
+Farthest farthest(const double* points, std::int64_t first, std::int64_t last) {
+    Farthest worst{first + 1, 0};
+    for (std::int64_t k = first + 1; k < last; ++k) {
+        const double d = squared_distance(points + 2 * k, points + 2 * first, points + 2 * last);
+        if (d > worst.square) worst = {k, d};
+    }
+    return worst;
+}
+
+void simplify(const double* points, const Polyline& line, std::uint8_t* kept) {
+    const std::int64_t end = line.first + line.count - 1;
+    const double *const first = points + 2 * line.first, *const last = points + 2 * end;
+    kept[line.first] = kept[end] = 1;
+    std::vector<std::array<std::int64_t, 2>> open{{line.first, end}};
+    int needed = first[0] == last[0] && first[1] == last[1] ? 3 : 0;
+    Checkpoints checkpoints;
+    while (!open.empty()) {
+        const auto [a, b] = open.back();
+        open.pop_back();
+        checkpoints.pass();
+        const Farthest worst = farthest(points, a, b);
+        if (worst.square == 0 || (worst.square <= line.tolerance * line.tolerance && needed <= 0)) continue;
+        --needed;
+        kept[worst.index] = 1;
+        open.push_back({a, worst.index});
+        open.push_back({worst.index, b});
+    }
+}
+
 }  // namespace
 
 Outlines trace_outlines(const std::int32_t* labels, int rows, int cols) { return Tracer(labels, rows, cols).trace(); }
 
 void simplify_lines(const double* points, const std::vector<Polyline>& lines, std::uint8_t* kept) {
-    std::vector<std::pair<std::int64_t, std::int64_t>> open;
-    Checkpoints checkpoints;
-    for (const Polyline& line : lines) {
-        checkpoints.pass();
-        const std::int64_t end = line.first + line.count - 1;
-        const double *const first = points + 2 * line.first, *const last = points + 2 * end;
-        kept[line.first] = kept[end] = 1;
-        open.assign(1, {line.first, end});
-        int needed = first[0] == last[0] && first[1] == last[1] ? 3 : 0;
-        while (!open.empty()) {
-            const auto [a, b] = open.back();
-            open.pop_back();
-            checkpoints.pass();
-            double most = 0;
-            std::int64_t worst = a;
-            for (std::int64_t k = a + 1; k < b; ++k) {
-                const double d = squared_distance(points + 2 * k, points + 2 * a, points + 2 * b);
-                if (d > most) most = d, worst = k;
+    for (const Polyline& line : lines) simplify(points, line, kept);
+    // Whatever gets in the way of something else comes a step closer to what it replaces, which does not.
+    for (bool changed = true; changed;) {
+        std::vector<PlaneSegment> segments;
+        std::vector<std::array<std::int64_t, 2>> ends;
+        for (const Polyline& line : lines)
+            for (std::int64_t k = line.first + 1, before = line.first; k < line.first + line.count; ++k) {
+                if (!kept[k]) continue;
+                const double *const from = points + 2 * before, *const to = points + 2 * k;
+                segments.push_back({{from[0], from[1]}, {to[0], to[1]}});
+                ends.push_back({before, k});
+                before = k;
             }
-            if (worst == a || (most <= line.tolerance * line.tolerance && needed <= 0)) continue;
-            --needed;
-            kept[worst] = 1;
-            open.emplace_back(a, worst);
-            open.emplace_back(worst, b);
-        }
+        const std::vector<std::uint8_t> crossing = find_crossings(segments);
+        changed = false;
+        for (std::size_t i = 0; i < ends.size(); ++i)
+            if (crossing[i] && ends[i][1] > ends[i][0] + 1) {
+                kept[farthest(points, ends[i][0], ends[i][1]).index] = 1;
+                changed = true;
+            }
     }
 }
 

@@ -31,7 +31,8 @@ Outlines trace_outlines(const std::int32_t* labels, int rows, int cols);
 
 // Which points of lines to keep so that no other lies farther than a tolerance from the line through these (Douglas and
 // Peucker). A line has points first .. first + count - 1 of (x, y); the first and the last stay, and of closed lines
-// at least three more where there are as many.
+// at least three more where there are as many. Lines that meet at their ends only do so afterwards, too: more points
+// stay where they would meet elsewhere.
 struct Polyline {
     std::int64_t first, count;
     double tolerance;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <numeric>
 #include <utility>
 
 #include "base/simd.hpp"
@@ -199,26 +200,38 @@ void PatchMap::estimate_correlation(const std::vector<SurfaceSums>& sums) {
     }
 }
 
-// Every thread has its own rows.
+// Runs first; every thread has its own rows.
 std::vector<Pixels> PatchMap::pixels_of(const Array<int>& number, int count) const {
+    struct Run {
+        int begin, end;
+    };
     const auto n = static_cast<std::size_t>(count);
-    std::vector<std::vector<Pixels>> found(static_cast<std::size_t>(team_.size()), std::vector<Pixels>(n));
+    std::vector<std::vector<std::vector<Run>>> found(static_cast<std::size_t>(team_.size()),
+                                                     std::vector<std::vector<Run>>(n));
     parallel_for(image_.rows(), team_, [&](int first, int last, int thread) {
-        std::vector<Pixels>& own = found[static_cast<std::size_t>(thread)];
+        auto& own = found[static_cast<std::size_t>(thread)];
         for (int row = first; row < last; ++row) {
             Watch::checkpoint();
             for (int p = image_.index(row, 0), end = p + image_.cols(), next = p; p < end; p = next) {
-                while (next < end && label_[next] == label_[p]) ++next;
-                const int k = number[label_[p]];
-                for (int q = p; k && q < next; ++q) own[static_cast<std::size_t>(k - 1)].push_back(q);
+                const int label = label_[p];
+                while (next < end && label_[next] == label) ++next;
+                if (const int k = number[label]) own[static_cast<std::size_t>(k - 1)].push_back({p, next});
             }
         }
     });
-    std::vector<Pixels> sets = std::move(found.front());
+    std::vector<Pixels> sets(n);
     parallel_each(count, team_, [&](int i, int) {
         const auto k = static_cast<std::size_t>(i);
-        for (std::size_t t = 1; t < found.size(); ++t)
-            sets[k].insert(sets[k].end(), found[t][k].begin(), found[t][k].end());
+        std::size_t size = 0;
+        for (const auto& of_thread : found)
+            for (const Run& run : of_thread[k]) size += static_cast<std::size_t>(run.end - run.begin);
+        sets[k].resize(size);
+        auto to = sets[k].begin();
+        for (const auto& of_thread : found)
+            for (const Run& run : of_thread[k]) {
+                std::iota(to, to + (run.end - run.begin), run.begin);
+                to += run.end - run.begin;
+            }
     });
     return sets;
 }

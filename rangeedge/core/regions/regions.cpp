@@ -42,9 +42,12 @@ bool add_uncovered(PatchMap& patches, PatchMap::Free reach, double limit) {
     if (std::none_of(any.begin(), any.end(), [](char found) { return found; })) return false;
     const Components parts(inside.data(), image.rows(), image.cols(), patches.team());
     std::vector<Pixels> sets(static_cast<std::size_t>(parts.count()));
-    for (int i = 0; i < parts.count(); ++i)
+    parallel_each(parts.count(), patches.team(), [&](int i, int) {
+        Pixels& pixels = sets[static_cast<std::size_t>(i)];
+        pixels.reserve(static_cast<std::size_t>(parts.area(i)));
         for (const auto [begin, end] : parts.runs(i))
-            for (int p = begin; p < end; ++p) sets[static_cast<std::size_t>(i)].push_back(p);
+            for (int p = begin; p < end; ++p) pixels.push_back(p);
+    });
     return patches.add_patches(sets, limit);
 }
 

@@ -54,8 +54,7 @@ RANGEEDGE_WIDE void deviations(const RangeMap& map, std::int64_t first, int n, d
 
 SurfaceImage::SurfaceImage(const RangeMap& map, double lateral, Team& team)
     : rows_(map.rows), cols_(map.cols), projective_(map.projective), regular_(!map.x && !map.y), lateral_(lateral),
-      offset_(map.offset), to_plane_(map.to_plane), pixel_(new Pixel[static_cast<std::size_t>(size())]),
-      state_(size(), none) {
+      offset_(map.offset), to_plane_(map.to_plane), pixel_(static_cast<std::size_t>(size())), state_(size(), none) {
     Array<Range> ranges(team.size());
     parallel_for(rows_, team, [&](int first, int last, int thread) {
         extend(ranges[thread], map.ordinate + first * cols_, (last - first) * cols_);

@@ -6,10 +6,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "base/array.hpp"
+#include "base/memory.hpp"
 #include "base/parallel.hpp"
 #include "image/noise.hpp"
 #include "regions/surface.hpp"
@@ -131,7 +131,7 @@ private:
     bool projective_, regular_;
     double lateral_, offset_, unit_ = 1, correlation_ = 1, correlation_area_ = 1;
     std::array<double, 6> to_plane_;
-    std::unique_ptr<Pixel[]> pixel_;
+    std::vector<Pixel, LargeAllocator<Pixel>> pixel_;
     Array<std::uint8_t> state_;
 };
 
