@@ -16,6 +16,9 @@ import numpy as np
 if TYPE_CHECKING:
     from .io.camera import Camera
 
+# Kernels count in 32 bits what a pixel may have four of: edge points, one a direction of scan lines, and borders.
+PIXEL_LIMIT = 2**29
+
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
@@ -93,9 +96,8 @@ def array(name: str, value: Any, expected: str, ndim: Collection[int] = (2,)) ->
         raise fail(name, f"{expected}, not empty", described(value), cv2.Error.StsBadSize)
     if value.dtype.kind not in "buif":
         raise fail(name, expected, described(value), cv2.Error.StsUnsupportedFormat)
-    # Kernels count pixels in 32 bits, in an image with a margin of one.
-    if value.ndim > 1 and (value.shape[0] + 2) * (value.shape[1] + 2) >= 2**31:
-        expected = f"{expected} of fewer than 2^31 pixels, a margin of one included"
+    if value.ndim > 1 and (value.shape[0] + 2) * (value.shape[1] + 2) >= PIXEL_LIMIT:
+        expected = f"{expected} of fewer than 2^29 pixels, a margin of one included (runBlocks takes larger images)"
         raise fail(name, expected, described(value), cv2.Error.StsBadSize)
     return value
 

@@ -264,12 +264,12 @@ def _points(frame: Frame, rows: np.ndarray, kinds: np.ndarray) -> np.ndarray:
     points["behind"] = _in_space(frame, plane, ordinates[:, 1])
     points["measured"] = _in_space(frame, rows[:, 11:13], rows[:, 13])
     through = points["behind"] - points["point"]
-    points["jump"] = np.where(jumps, np.linalg.norm(through, axis=1) if frame.ranges else np.abs(through @ axes[2]), 0)
+    points["jump"] = np.where(jumps, _norms(through) if frame.ranges else np.abs(through @ axes[2]), 0)
     points["behind"][~jumps] = np.nan
-    points["normals"] = _normals(frame, plane, ordinates, gradients) @ axes
-    first, second = points["normals"][:, 0], points["normals"][:, 1]
-    apart = np.linalg.norm(first - second, axis=1), np.linalg.norm(first + second, axis=1)
-    points["crease"] = np.where(meets, np.degrees(2 * np.arctan2(*apart)), 0)
+    normals = _normals(frame, plane, ordinates, gradients).reshape(-1, 3) @ axes
+    points["normals"] = normals.reshape(-1, 2, 3)
+    first, second = (points["normals"][meets, side] for side in (0, 1))
+    points["crease"][meets] = np.degrees(2 * np.arctan2(_norms(first - second), _norms(first + second)))
     points["significance"], points["deviation"] = rows[:, 10], rows[:, 14]
     return points
 
@@ -286,9 +286,17 @@ def _normals(frame: Frame, plane: np.ndarray, ordinates: np.ndarray, gradients: 
     The plane of ordinate q = gx X + gy Y + g0 over the plane of the image is gx x + gy y + g0 z = 1 where lines of
     sight meet, and z = -q where they are parallel.
     """
-    third = ordinates - np.einsum("nsk,nk->ns", gradients, plane) if frame.projective else np.ones(ordinates.shape)
-    normals = -np.concatenate([gradients, third[..., None]], axis=-1)
-    return normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+    normals = np.empty((*ordinates.shape, 3))
+    normals[..., :2] = gradients
+    along = gradients[..., 0] * plane[:, :1] + gradients[..., 1] * plane[:, 1:]
+    normals[..., 2] = ordinates - along if frame.projective else 1
+    normals /= -_norms(normals)[..., None]
+    return normals
+
+
+def _norms(vectors: np.ndarray) -> np.ndarray:
+    """Lengths along the last axis."""
+    return np.sqrt(np.einsum("...i,...i->...", vectors, vectors))
 
 
 def _chains(headers: np.ndarray, points: np.ndarray, around: np.ndarray | None = None) -> np.ndarray:
@@ -315,4 +323,4 @@ def _lengths(places: np.ndarray, chains: np.ndarray, around: np.ndarray | None =
     step = np.abs(places[following] - places)
     if around is not None:
         step = np.where(around > 0, np.minimum(step, np.abs(around - step)), step)
-    return np.add.reduceat(np.linalg.norm(step, axis=1), first)
+    return np.add.reduceat(_norms(step), first)

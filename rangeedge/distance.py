@@ -290,9 +290,9 @@ def _salience(value: np.ndarray) -> np.ndarray:
 
 
 def _indexable(name: str, value: Any) -> Any:
-    """`value`, unless it is an image whose pixels CV_32S labels cannot number or whose columns floats cannot."""
-    if isinstance(value, np.ndarray) and (value.size >= 2**31 or max(value.shape, default=0) > 2**24):
-        expected = "of fewer than 2^31 pixels and sides of at most 2^24"
+    """`value`, unless it is an image whose rows or columns floats cannot number."""
+    if isinstance(value, np.ndarray) and max(value.shape, default=0) > 2**24:
+        expected = "an image with sides of at most 2^24"
         raise fail(name, expected, described(value), cv2.Error.StsOutOfRange)
     return value
 

@@ -484,7 +484,7 @@ class Closing(Options):
         unit="standard deviations",
     )
     share: float = option(
-        0.9,
+        0.5,
         _real(0, 1, above=True),
         "float",
         "Share of the pixels of a surface that must lie within `tolerance`, in (0, 1].",

@@ -18,6 +18,7 @@ _MOST = np.deg2rad(720)  # beyond which rays are in no order at all
 _SECTOR = np.deg2rad(90)
 _MARGIN = np.deg2rad(30)  # that a sector overlaps its neighbours, so that surfaces go on beyond its end
 _CLOSED = np.deg2rad(300)  # from which on first and last line may be neighbours
+_SAMPLED = 64  # pixels of a line, about so many of which tell how far it is from the next
 _NEIGHBOURS = 2.5  # steps between lines, up to which they are
 
 
@@ -92,11 +93,13 @@ def around(frame: Frame, function: Callable[..., np.ndarray], *maps: np.ndarray)
 
 
 def _steps(rays: np.ndarray, axis: int) -> np.ndarray:
-    """Angles between the middles of neighbouring lines across an axis; the typical one where a line has no data."""
-    middles = _middles(rays, axis)
-    angles = _angles(middles[:-1], middles[1:])
-    known = angles[np.isfinite(angles)]
-    return np.where(np.isfinite(angles), angles, np.median(known) if len(known) else 0.0)
+    """Angles between neighbouring lines across an axis, typical of their pixels; of all lines where one has no data."""
+    lines = np.moveaxis(rays, axis, 0)
+    lines = lines[:, :: max(1, lines.shape[1] // _SAMPLED)]
+    angles = np.sort(2 * np.arcsin(np.minimum(1, np.linalg.norm(np.diff(lines, axis=0), axis=2) / 2)), axis=1)
+    seen = np.isfinite(angles).sum(axis=1)  # NaN come last
+    middle = angles[np.arange(len(angles)), np.maximum(seen - 1, 0) // 2]
+    return np.where(seen > 0, middle, np.median(middle[seen > 0]) if seen.any() else 0.0)
 
 
 def _middles(rays: np.ndarray, axis: int) -> np.ndarray:

@@ -25,7 +25,7 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parents[1]
 LEAST_CAUGHT = 0.95
 SLOWEST = 900  # seconds of one step; a mutant with which tests take longer is caught
-COMPILER, NO_END = "the compiler", f"no end within {SLOWEST} s"
+COMPILER, NO_END, CRASH = "the compiler", f"no end within {SLOWEST} s", "a crash"
 
 
 class Mutant(NamedTuple):
@@ -209,7 +209,7 @@ class Copy:
         if run.returncode == 0:
             return ""
         named = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", run.stdout, re.MULTILINE)
-        return named[1] if named else f"exit code {run.returncode}"
+        return named[1] if named else CRASH
 
     def noticed(self, mutant: Mutant) -> str:
         """What notices the mutant; nothing where it survives."""
@@ -246,7 +246,7 @@ def main() -> int:
     if options.list or not chosen:
         return int(bool(lost))
     with tempfile.TemporaryDirectory() as folder:
-        copy, caught, sound = Copy(Path(folder)), 0, {COMPILER, NO_END, ""}
+        copy, caught, sound = Copy(Path(folder)), 0, {COMPILER, NO_END, CRASH, ""}
         for mutant in chosen:
             found = copy.noticed(mutant)
             while found not in sound and copy.failed(found):

@@ -67,6 +67,16 @@ def test_noise_on_surfaces_is_halved_and_edges_stay(sensor, seed):
     assert rms((after - rendering.depth)[near]) < 1.02 * rms((before - rendering.depth)[near])
 
 
+@pytest.mark.parametrize("model", [NoiseModel(a=0.07e-3, c=0.15e-3), NoiseModel(a=2.8e-3, c=0.17e-3)])
+def test_pixels_that_only_look_flying_are_not_moved(model):
+    rendering = renderScene(demoScene(), kinectCamera())  # every pixel sees one surface
+    scan = gaussianNoise(rendering, model)
+    cleaned, _ = cleanDepth(scan.src, **scan.geometry)
+    near = np.isfinite(cleaned) & (from_edges(rendering) <= 3)
+    assert near.sum() > 40000
+    assert rms((cleaned - rendering.depth)[near]) < 0.7 * rms((scan.src - rendering.depth)[near])
+
+
 def test_a_hole_in_a_slope_continues_it():
     rendering, depth = seen([plane((0, 0, 1.0), (0.5, 0.3, -1))], 0.001)
     depth[50:66, 70:90] = np.nan
@@ -276,10 +286,15 @@ def room(sigma):
     return truth, rays * (truth + noise)[..., None]
 
 
-def test_rooms_seen_all_around_are_cleaned():
+@pytest.mark.parametrize("sky", [0, 40])
+def test_rooms_seen_all_around_are_cleaned(sky):
     truth, points = room(0.005)
+    # Columns of which different parts are open to the sky look in different directions on the whole.
+    points[np.arange(60)[:, None] >= 60 - np.random.default_rng(1).integers(0, sky + 1, points.shape[1])] = np.nan
     cleaned, changed = cleanDepth(points)
-    before, after = (np.linalg.norm(p, axis=2) - truth for p in (points, cleaned))
-    assert (changed == CLEAN_SMOOTHED).mean() > 0.95
+    seen = np.isfinite(points[..., 0])
+    before, after = ((np.linalg.norm(p, axis=2) - truth)[seen] for p in (points, cleaned))
+    assert (changed == CLEAN_SMOOTHED)[seen].mean() > 0.95
     assert rms(after) < rms(before) / 2
+    points, cleaned = points[seen], cleaned[seen]
     assert np.allclose(np.cross(cleaned, points), 0, atol=1e-6)

@@ -727,3 +727,17 @@ def test_quotients_that_differ_less_than_doubles_do(near, far, levels):
             salience[place] = level / 2**24
         labels = salienceDistanceTransformWithLabels(salience, SALIENCE_MULTIPLICATIVE)[1]
         assert labels[40, 40] == np.ravel_multi_index(places[nearest], salience.shape)
+
+
+def test_labels_around_barriers_are_those_of_the_ways():
+    edges, barrier = np.zeros((11, 13), np.uint8), np.zeros((11, 13), np.uint8)
+    barrier[:10, 5] = 255
+    edges[0, 3] = edges[0, 12] = 255  # the first is nearer to the pixels beside the wall, but for the wall
+    distance, labels = distanceTransformWithLabels(edges, barrier=barrier)
+    assert (distance[0, 6:] == np.arange(6, -1, -1)).all()
+    assert (labels[0, 6:] == 12).all()
+    for source in (3, 12):
+        alone = np.zeros_like(edges)
+        alone[0, source] = 255
+        own = labels == source
+        np.testing.assert_allclose(distance[own], distanceTransform(alone, barrier=barrier)[own], rtol=1e-6)

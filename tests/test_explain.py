@@ -10,6 +10,7 @@ import pytest
 import rangeedge
 from rangeedge import detectEdges, drawExplanation, explainPixel
 from rangeedge.app.cli import main
+from rangeedge.draw.explanation import _ticks
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
 
 CAMERA = pinholeCamera(np.array([[80.0, 0, 39.5], [0, 80.0, 29.5], [0, 0, 1]]), (80, 60))
@@ -191,6 +192,21 @@ def test_words_and_picture():
     without = explainPixel(src, *np.argwhere(src.T == 0)[0].tolist(), **options)
     assert (without.stage, without.lines) == ("no data", ())
     assert drawExplanation(without).ndim == 3
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "ticks", "digits"),
+    [
+        (0.7185, 0.7445, [0.72, 0.73, 0.74], 2),
+        (0.57, 1.08, [0.6, 0.8, 1.0], 1),
+        (-3.0, 41.0, [0, 10, 20, 30, 40], 0),
+        (1000.0, 1000.001, [1000.0002, 1000.0004, 1000.0006, 1000.0008], 4),
+    ],
+)
+def test_depths_are_marked_at_round_numbers(low, high, ticks, digits):
+    found, needed = _ticks(low, high)
+    assert found[(found > low + 1e-9) & (found < high - 1e-9)] == pytest.approx(ticks, abs=1e-9)
+    assert needed == digits
 
 
 @pytest.mark.parametrize(

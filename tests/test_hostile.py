@@ -247,3 +247,36 @@ def test_a_map_of_noise_may_lie_in_memory_as_it_likes(dtype):
     for other in (np.asfortranarray(noise), np.repeat(noise, 2, axis=1)[:, ::2], unaligned(noise)):
         for one, same in zip(rangeedge.edgeStrength(DEPTH, noise=other), expected, strict=True):
             assert np.array_equal(one, same)
+
+
+def test_images_of_more_pixels_than_kernels_count(monkeypatch):
+    huge = np.broadcast_to(np.float32(1), (2**15, 2**14))
+    for call in (rangeedge.detectEdges, rangeedge.estimateNoise, rangeedge.extractSeeds):
+        with pytest.raises(rangeedge.error, match=r"fewer than 2\^29 pixels"):
+            call(huge)
+    with_margin = (DEPTH.shape[0] + 2) * (DEPTH.shape[1] + 2)
+    monkeypatch.setattr(_check, "PIXEL_LIMIT", with_margin + 1)
+    rangeedge.detectEdges(DEPTH)
+    monkeypatch.setattr(_check, "PIXEL_LIMIT", with_margin)
+    with pytest.raises(rangeedge.error, match="runBlocks"):
+        rangeedge.detectEdges(DEPTH)
+
+
+@pytest.mark.parametrize("text", ["x\udcff", "\0", "\ud800" * 50, "caf\xe9"])
+def test_titles_of_any_text(text):
+    black = np.zeros((20, 30), np.uint8)
+    assert rangeedge.drawPanels([(text, black), ("b", black)]).dtype == np.uint8
+
+
+def test_no_more_columns_than_panels():
+    panels = [("a", np.zeros((20, 30), np.uint8))] * 3
+    assert np.array_equal(rangeedge.drawPanels(panels, 2**31 - 1), rangeedge.drawPanels(panels, 3))
+
+
+@pytest.mark.parametrize("value", [np.ones((2, 2)), 1, "yes", None])
+def test_pictures_take_true_or_false(value):
+    segments = rangeedge.fitSegments(rangeedge.linkEdges(DEPTH))
+    with pytest.raises(rangeedge.error, match="`key` must be True or False"):
+        rangeedge.drawPanels([("a", np.zeros((20, 30), np.uint8))], key=value)
+    with pytest.raises(rangeedge.error, match="`lengths` must be True or False"):
+        rangeedge.drawSegments(DEPTH, *segments, lengths=value)

@@ -3,6 +3,7 @@
 import csv
 import json
 
+import cv2
 import numpy as np
 import pytest
 
@@ -23,6 +24,7 @@ from rangeedge import (
     writeLines,
 )
 from rangeedge.app.cli import main
+from rangeedge.segments import SEGMENT
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene, sphere
 
 K = np.array([[150.0, 0, 79.5], [0, 150, 59.5], [0, 0, 1]])
@@ -256,6 +258,29 @@ def test_pictures_show_segments_vertices_and_lengths(depth, fitted):
     assert (labelled != dotted).sum() > (dotted != plain).sum()
     dst = np.zeros((120, 160, 3), np.uint8)
     assert drawSegments(depth, fitted.segments, dst=dst, K=K) is dst
+
+
+def test_lengths_are_written_where_no_other_is(monkeypatch):
+    rng = np.random.default_rng(0)
+    segments = np.zeros(60, SEGMENT)
+    segments["pixels"] = rng.uniform(0, 200, (60, 1, 2)) + rng.uniform(-60, 60, (60, 2, 2))
+    segments["length"] = np.linalg.norm(segments["pixels"][:, 1] - segments["pixels"][:, 0], axis=1)
+    written = []
+    put = cv2.putText
+    monkeypatch.setattr(
+        cv2, "putText", lambda canvas, text, at, *rest: written.append((text, at)) or put(canvas, text, at, *rest)
+    )
+    drawSegments(np.ones((200, 220)), segments, scale=3, lengths=True)
+    assert 5 < len(set(written)) < 60
+    drawn = np.zeros((600, 660), np.uint8)
+    for text, (x, y) in dict.fromkeys(written):
+        (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.48, 1)
+        assert 0 <= x <= 660 - width
+        assert height <= y <= 600
+        assert not drawn[y - height : y, x : x + width].any()
+        drawn[y - height : y, x : x + width] = 1
+    longest = f"{segments['length'].max():.3g}"
+    assert longest in [text for text, _ in written[:2]]
 
 
 @pytest.mark.parametrize(

@@ -25,12 +25,12 @@ PUBLIC = """
     estimateNoise ScanLineParams splitScanLine EdgeStrength edgeStrength edgePoints kindNames flyingPixels
     strengthImage overallStrength selectEdges thinEdges detectEdges detectEdgesWithStrength ScanLineDetector
     Explanation explainPixel
-    createScanLineDetector mapFrames EdgeChain EdgeChains linkEdges Segments fitSegments
+    createScanLineDetector mapFrames EdgeChain EdgeChains linkEdges Segments fitSegments fitArcs
     Line toLines writeLines readLines closeContours
     distanceTransform distanceTransformWithLabels salienceDistanceTransform salienceDistanceTransformWithLabels
     extractSeeds extractSeedsWithStats growRegions growRegionsWithStats segmentRegions segmentRegionsWithStats
     RegionBoundary RegionBoundaries regionBoundaries regionAdjacency regionCorners cleanDepth
-    drawEdges drawChains drawSegments drawRegions drawBoundaries colorizeDistance drawOverview drawPanels
+    drawEdges drawChains drawSegments drawArcs drawRegions drawBoundaries colorizeDistance drawOverview drawPanels
     drawExplanation
     DIR_ROWS DIR_COLS DIR_DIAG45 DIR_DIAG135 DIR_ALL FIT_LSQ FIT_INTERP MEASURE_MIDPOINT MEASURE_ENDPOINT
     CREASE_MAX CREASE_NORMAL EDGE_JUMP EDGE_CONVEX EDGE_CONCAVE EDGE_OCCLUDING EDGE_OCCLUDED EDGE_BOUNDARY

@@ -12,7 +12,7 @@ from .. import __version__
 from .._check import named
 from .._option import parsed, takes
 from ..chains import EdgeChains, link_frame
-from ..draw import drawSegments
+from ..draw import drawSegments, line_overview
 from ..frame import Frame
 from ..io import RangeImage
 from ..io.lines import encoded_lines
@@ -64,6 +64,7 @@ def line_files(found: LineResults, title: str, options: Mapping[str, Any], image
     scale = min(max(1, -(-_SCALE_PIXELS // image.src.shape[1])), 16)
     segments = Segments(found.segments, found.vertices)
     picture = drawSegments(image.src, *segments, scale=scale, lengths=True, **view)
+    caption = f"{title}: {len(found.segments)} segments and their lengths, unit: {found.known['unit']}"
     report = {
         "image": title,
         "rangeedge": __version__,
@@ -79,7 +80,7 @@ def line_files(found: LineResults, title: str, options: Mapping[str, Any], image
         "noise": plain(found.frame.noise),
     }
     return {
-        "lines.png": encoded(".png", picture),
+        "lines.png": encoded(".png", line_overview(picture, caption)),
         "chains.csv": encoded_lines(".csv", found.chains),
         "chains.ply": encoded_lines(".ply", found.chains),
         "chains.geojson": encoded_lines(".geojson", found.chains, **on_map(image)),

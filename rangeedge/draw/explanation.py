@@ -135,13 +135,15 @@ def _panel(line: ScanLine) -> np.ndarray:
     near = sorted(line.cuts, key=lambda cut: abs(cut.sample - line.at))[:_NOTES]
     noted = sorted(near, key=lambda cut: cut.sample)
     for cut in line.cuts:
-        _draw_cut(panel, plot, cut, noted.index(cut) + 1 if cut in noted else None)
+        _draw_cut(panel, plot, cut)
     _curves(panel, plot, line)
     seen = np.flatnonzero(np.isfinite(line.samples["depth"]))
     for place in plot.at(seen, line.samples["depth"][seen]).tolist():
         cv2.circle(panel, place, 5 << (_SHIFT - 1), _SAMPLES, cv2.FILLED, cv2.LINE_AA, _SHIFT)
     here = plot.at(np.array([line.at]), line.samples["depth"][[line.at]])[0].tolist()
     cv2.circle(panel, here, 8 << _SHIFT, _PIXEL, 2, cv2.LINE_AA, _SHIFT)
+    for i, cut in enumerate(noted, 1):
+        _number_cut(panel, int(plot.x(cut.sample)), i)
     notes = [f"{i}  {cut.kind}: {cut.fate}." for i, cut in enumerate(noted, 1)]
     below = _text(_wrapped(notes or ["no cut"], _WIDTH)[: 2 * _NOTES], _WIDTH)
     below = cv2.copyMakeBorder(
@@ -154,15 +156,32 @@ def _axes(panel: np.ndarray, plot: _Plot, line: ScanLine) -> None:
     cv2.rectangle(panel, (_LEFT, _TOP), (_WIDTH - _RIGHT, _HEIGHT - _BOTTOM), _AXIS, 1)
     first, last = (f"({line.samples['x'][i]:.0f}, {line.samples['y'][i]:.0f})" for i in (0, -1))
     _write(panel, f"{line.name}, from {first} to {last}", (_LEFT, _TOP - 12), 0.5)
-    for depth in np.linspace(plot.low, plot.high, 5):
-        y = int(plot.y(depth))
+    ticks, digits = _ticks(plot.low, plot.high)
+    for value in ticks:
+        y = int(plot.y(value))
         cv2.line(panel, (_LEFT - 4, y), (_LEFT, y), _AXIS, 1)
-        _write(panel, f"{depth:.4g}", (6, y + 5), 0.42)
+        text = f"{value:.{digits}f}"
+        _write_before(panel, text, y + 5)
+    _write_before(panel, "height" if plot.upright else "depth", _TOP - 12)
+    _write_before(panel, "pixels", _HEIGHT - _BOTTOM + 19)
     for offset in range(-plot.count // 10 * 10, plot.count, 10):
         if 0 <= line.at + offset < plot.count:
             x = int(plot.x(line.at + offset))
             cv2.line(panel, (x, _HEIGHT - _BOTTOM), (x, _HEIGHT - _BOTTOM + 4), _AXIS, 1)
             _write(panel, f"{offset:+d}" if offset else "0", (x - 10, _HEIGHT - _BOTTOM + 19), 0.42)
+
+
+def _write_before(panel: np.ndarray, text: str, y: int) -> None:
+    """Left of the axis, up to it."""
+    _write(panel, text, (_LEFT - 8 - cv2.getTextSize(text, _FONT, 0.42, 1)[0][0], y), 0.42)
+
+
+def _ticks(low: float, high: float) -> tuple[np.ndarray, int]:
+    """About five round values, and the digits after the point that they need."""
+    power = int(np.floor(np.log10((high - low) / 4)))
+    step = next(s for s in (1, 2, 5, 10) if s * 10.0**power >= (high - low) / 5) * 10.0**power
+    ticks = step * np.arange(np.ceil(low / step), np.floor(high / step) + 1)
+    return ticks, max(0, -int(np.floor(np.log10(step) + 1e-9)))
 
 
 def _segments(line: ScanLine) -> list[np.ndarray]:
@@ -187,12 +206,18 @@ def _curves(panel: np.ndarray, plot: _Plot, line: ScanLine) -> None:
             cv2.polylines(panel, [places], False, _CURVES[i % 2], 2, cv2.LINE_AA, _SHIFT)
 
 
-def _draw_cut(panel: np.ndarray, plot: _Plot, cut: Cut, number: int | None) -> None:
+def _draw_cut(panel: np.ndarray, plot: _Plot, cut: Cut) -> None:
     x = int(plot.x(cut.sample))
     if not cut.test:
+        cv2.line(panel, (x, _TOP), (x, _HEIGHT - _BOTTOM), _INK, 4)
         cv2.line(panel, (x, _TOP), (x, _HEIGHT - _BOTTOM), kind_colour(cut.bits), 2)
     else:
         for y in range(_TOP, _HEIGHT - _BOTTOM, 8):
             cv2.line(panel, (x, y), (x, y + 3), _FAINT, 1)
-    if number:
-        _write(panel, str(number), (x + 4, _TOP + 14), 0.46)
+
+
+def _number_cut(panel: np.ndarray, x: int, number: int) -> None:
+    """At the end of the line of a cut that nothing else is written at."""
+    place = (x + 5 if x + 16 < _WIDTH - _RIGHT else x - 14, _HEIGHT - _BOTTOM - 6)
+    cv2.putText(panel, str(number), place, _FONT, 0.46, _PAPER, 4, cv2.LINE_AA)
+    _write(panel, str(number), place, 0.46)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import cv2
 import numpy as np
 
-from .._check import deliver, described, fail, integer
+from .._check import boolean, deliver, described, fail, integer
 from .._option import takes
 from ..arcs import ARC, arc_points
 from ..chains import EdgeChain, EdgeChains
@@ -26,6 +26,9 @@ if TYPE_CHECKING:
 _SHIFT = 4  # binary digits of fractions of a pixel
 _VERTEX = (255, 255, 255)
 _INK, _HALO = (255, 255, 255), (0, 0, 0)
+_BESIDE = (4, -4)  # pixels of the picture, from a place to the text about it
+_PLACES = (0.5, 0.35, 0.65, 0.2, 0.8)  # along a segment, for its length
+_LEAST_SEEN = 0.5  # of the width of a text, that a segment has for it
 
 
 @takes(GEOMETRY)
@@ -109,7 +112,8 @@ def drawSegments(
     segments, vertices : structured ndarray
         From `fitSegments`.
     lengths : bool
-        Whether to write the length of each segment beside it.
+        Whether to write the length of each segment beside it, in the unit of the image; those of long segments first,
+        and only where there is room.
 
     Returns
     -------
@@ -133,13 +137,14 @@ def drawSegments(
         missing = value is None and name == "vertices"
         if not missing and (not isinstance(value, np.ndarray) or value.dtype != dtype):
             raise fail(name, "a structured array from fitSegments", described(value))
+    lengths = boolean("lengths", lengths)
     canvas, scale = canvas_of(src, scale, geometry)
     for segment in segments:
         _line(canvas, segment["pixels"], int(segment["kind"]), scale)
     for vertex in vertices if vertices is not None else ():
         _dot(canvas, np.array([vertex["x"], vertex["y"]]), _VERTEX, scale)
-    for segment in segments if lengths else ():
-        _label(canvas, segment["pixels"].mean(axis=0), f"{segment['length']:.4g}", scale)
+    if lengths:
+        _write_lengths(canvas, segments, scale)
     return deliver("dst", canvas, dst)
 
 
@@ -226,8 +231,31 @@ def _dot(canvas: np.ndarray, place: np.ndarray, colour: tuple[int, int, int], sc
     cv2.circle(canvas, (x, y), (scale + 1) << _SHIFT, colour, cv2.FILLED, cv2.LINE_AA, _SHIFT)
 
 
+def _write_lengths(canvas: np.ndarray, segments: np.ndarray, scale: int) -> None:
+    """Lengths beside segments, of which the long ones choose first, where no other is written."""
+    taken = np.zeros(canvas.shape[:2], bool)
+    seen = scale * np.linalg.norm(segments["pixels"][:, 1] - segments["pixels"][:, 0], axis=1)
+    for i in np.argsort(-seen, kind="stable"):
+        text = f"{segments['length'][i]:.3g}"
+        (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, _text_size(scale), 1)
+        if seen[i] < _LEAST_SEEN * width:
+            continue
+        first, last = segments["pixels"][i]
+        for share in _PLACES:
+            place = first + share * (last - first)
+            x, y = (fixed(place, scale) >> _SHIFT) + _BESIDE
+            box = np.s_[max(y - height - 3, 0) : y + 4, max(x - 3, 0) : x + width + 3]
+            if min(x, y - height) >= 0 and x + width < taken.shape[1] and y < len(taken) and not taken[box].any():
+                taken[box] = True
+                _label(canvas, place, text, scale)
+                break
+
+
+def _text_size(scale: int) -> float:
+    return 0.3 + 0.06 * scale
+
+
 def _label(canvas: np.ndarray, place: np.ndarray, text: str, scale: int) -> None:
-    x, y = (fixed(place, scale) >> _SHIFT).tolist()
-    size = 0.3 + 0.06 * scale
+    x, y = ((fixed(place, scale) >> _SHIFT) + _BESIDE).tolist()
     for colour, width in ((_HALO, 3), (_INK, 1)):
-        cv2.putText(canvas, text, (x + 4, y - 4), cv2.FONT_HERSHEY_SIMPLEX, size, colour, width, cv2.LINE_AA)
+        cv2.putText(canvas, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, _text_size(scale), colour, width, cv2.LINE_AA)

@@ -14,7 +14,7 @@ from ..frame import read_frame
 from ..options import GEOMETRY, ScanLineParams
 from ..selection import strengthImage
 from .distance import checked_distance, distance_colours
-from .palette import KINDS, PLAIN, colour_index, paint
+from .palette import EDGE_KINDS, LINE_KINDS, colour_index, paint
 from .regions import drawRegions
 from .relief import hatch, relief_of, subdued
 
@@ -165,6 +165,11 @@ def drawPanels(
     return _sheet(full, None, columns, key=_check.boolean("key", key))
 
 
+def line_overview(picture: np.ndarray, caption: str) -> np.ndarray:
+    """A picture of lines under a caption, with the key to their colours."""
+    return np.vstack([*_sentence(caption, picture.shape[1]), picture, _key(picture.shape[1], LINE_KINDS)])
+
+
 def region_overview(
     surface: np.ndarray,
     seeds: np.ndarray,
@@ -230,7 +235,8 @@ def _depth_caption(depth: np.ndarray, heightMap: bool) -> str:
     values = sign * depth[np.isfinite(depth)]
     if not values.size:
         return f"{name}: no data"
-    return f"{name} {values.min():.4g} to {values.max():.4g}, {100 * values.size / depth.size:.0f} % valid"
+    colours = "high bright" if heightMap else "near bright"
+    return f"{name} {values.min():.4g} to {values.max():.4g}, {colours}, {100 * values.size / depth.size:.0f} % valid"
 
 
 def _distance_panel(distance: np.ndarray, valid: np.ndarray) -> tuple[str, np.ndarray]:
@@ -282,10 +288,22 @@ def _encodable(text: str) -> str:
     return text.encode("utf-8", "replace").decode()
 
 
-def _key(width: int) -> np.ndarray:
-    """The colours of edges with their meaning, on as many lines as they need."""
+def _sentence(text: str, width: int) -> list[np.ndarray]:
+    """Bars of text no wider than a picture."""
+    lines = [""]
+    for word in text.split():
+        longer = f"{lines[-1]} {word}".strip()
+        if lines[-1] and _text_width(longer) > width:
+            lines.append(word)
+        else:
+            lines[-1] = longer
+    return [_bar(line, width) for line in lines]
+
+
+def _key(width: int, entries: Sequence[tuple[tuple[int, int, int], str]] = EDGE_KINDS) -> np.ndarray:
+    """Colours with their meaning, by default those of edges, on as many lines as they need."""
     lines, x = [_bar("", width)], 6
-    for colour, text in [*((colour, text) for _, colour, text in reversed(KINDS)), (PLAIN, "other")]:
+    for colour, text in entries:
         needed = _text_width(text) + 24
         if x > 6 and x + needed > width:
             lines.append(_bar("", width))

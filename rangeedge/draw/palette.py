@@ -14,6 +14,15 @@ KINDS = (  # later entries hide earlier ones
     (EDGE_JUMP, (0, 94, 213), "jump, near side"),
     (EDGE_OCCLUDED, (167, 121, 204), "jump, far side"),
 )
+EDGE_KINDS = [*((colour, text) for _, colour, text in reversed(KINDS)), (PLAIN, "other")]
+LINE_KINDS = [  # of chains and segments, which have one line for both sides of a jump
+    *(
+        (colour, text.split(",")[0])
+        for bit, colour, text in reversed(KINDS)
+        if bit & (EDGE_JUMP | EDGE_CONVEX | EDGE_CONCAVE)
+    ),
+    (PLAIN, "corner"),
+]
 _EDGE_COLOURS = np.array([(0, 0, 0), PLAIN, *(colour for _, colour, _ in KINDS)], np.uint8)
 
 

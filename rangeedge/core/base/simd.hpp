@@ -159,6 +159,16 @@ template <int bytes>
 RANGEEDGE_INLINE Floats<bytes> abs(const Floats<bytes>& a) {
     return from_bits(bits(a) & Ints<bytes>::all(0x7fffffff));
 }
+template <int bytes>
+RANGEEDGE_INLINE Doubles<bytes> abs(const Doubles<bytes>& a) {
+    typedef Lanes<std::int64_t, bytes> Bits;
+    Bits r;
+    std::memcpy(&r, &a, sizeof r);
+    r &= Bits::all(0x7fffffffffffffff);
+    Doubles<bytes> result;
+    std::memcpy(&result, &r, sizeof result);
+    return result;
+}
 
 // The first n lanes, and 0 in the others. The mask is a stretch of the array below that begins n words before the clear
 // ones.

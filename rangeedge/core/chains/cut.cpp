@@ -58,7 +58,7 @@ public:
 
 private:
     std::ptrdiff_t size() const { return points_.size(); }
-    const Point& at(std::ptrdiff_t i) const { return points_[i % size()]; }
+    const Point& at(std::ptrdiff_t i) const { return points_[i < size() ? i : i % size()]; }
 
     std::ptrdiff_t member(std::ptrdiff_t i) const {
         const std::ptrdiff_t n = chain_.members.size();
@@ -86,13 +86,19 @@ private:
             const double length = std::hypot(q.x - p.x, q.y - p.y);
             const Point tangent = length > 0 ? Point{(q.x - p.x) / length, (q.y - p.y) / length} : Point{0, 0};
             if (i > first) along += (at(i).x - at(i - 1).x) * tangent.x + (at(i).y - at(i - 1).y) * tangent.y;
-            Point middle{0, 0};
-            const std::ptrdiff_t reach = std::min<std::ptrdiff_t>({line_reach, i - first, end - 1 - i});
-            for (std::ptrdiff_t k = i - reach; k <= i + reach; ++k) middle.x += at(k).x, middle.y += at(k).y;
-            const auto count = static_cast<double>(2 * reach + 1);
-            const double ordinate = mean_ordinate(i, {middle.x / count, middle.y / count}, tangent);
+            const double ordinate = mean_ordinate(i, mean_around(i, first, end), tangent);
             profile_.push_back({along, (whole - ordinate) / (plane_per_pixel_ * (frame_.projective ? whole : 1))});
         }
+    }
+
+    // The mean of as many positions before one as after it.
+    Point mean_around(std::ptrdiff_t i, std::ptrdiff_t first, std::ptrdiff_t end) const {
+        Point sum{0, 0};
+        if (!is_one_sided(chain_.type)) return sum;
+        const std::ptrdiff_t reach = std::min<std::ptrdiff_t>({line_reach, i - first, end - 1 - i});
+        for (std::ptrdiff_t k = i - reach; k <= i + reach; ++k) sum.x += at(k).x, sum.y += at(k).y;
+        const auto count = static_cast<double>(2 * reach + 1);
+        return {sum.x / count, sum.y / count};
     }
 
     void set_unit(std::ptrdiff_t first, std::ptrdiff_t end) {
@@ -123,8 +129,8 @@ private:
         return found;
     }
 
-    // Of the nearer surface, or of both that meet, at a point; of a jump, whose candidates lie half a pixel aside, where
-    // their scan lines cross the line through `middle` along `tangent`.
+    // Of the nearer surface, or of both that meet, at a point; of a jump, whose candidates lie half a pixel aside,
+    // where their scan lines cross the line through `middle` along `tangent`.
     double mean_ordinate(std::ptrdiff_t i, const Point& middle, const Point& tangent) const {
         double sum = 0;
         int count = 0;

@@ -1,5 +1,5 @@
-// Chains are cut at corners, in the image and in space: where an edge runs on straight in the image into another one that
-// leads elsewhere in depth, its depths along the chain have the corner.
+// Chains are cut at corners, in the image and in space: where an edge runs on straight in the image into another one
+// that leads elsewhere in depth, its depths along the chain have the corner.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <vector>

@@ -27,7 +27,7 @@ struct PointSums {
 
     // The weighted sum of squared distances from the best line.
     double rss() const {
-        const double a = xx - x * x / w, b = xy - x * y / w, c = yy - y * y / w;
+        const double mx = x / w, my = y / w, a = xx - x * mx, b = xy - x * my, c = yy - y * my;
         return std::max((a + c - std::sqrt((a - c) * (a - c) + 4 * b * b)) / 2, 0.0);
     }
 

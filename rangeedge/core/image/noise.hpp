@@ -111,7 +111,7 @@ struct SampleNoise {
     // sigma_n, with which a fit to n samples counts.
     double of_fit(int n) const { return sigma + Noise::wave_share(n) * (waves - sigma); }
 };
-inline SampleNoise mean(const SampleNoise& a, const SampleNoise& b) {
+inline SampleNoise mean_of(const SampleNoise& a, const SampleNoise& b) {
     return {(a.sigma + b.sigma) / 2, (a.waves + b.waves) / 2};
 }
 

@@ -236,7 +236,7 @@ int Grower::choose(int p) const {
     return best.patch;
 }
 
-// Calls visit(p, thread) for all pixels p of the front, in parallel if they are many; every thread has a stretch of its own.
+// Calls visit(p, thread) for all pixels p of the front, in parallel if they are many; every thread has its own stretch.
 template <class F>
 void Grower::for_front(F&& visit) {
     const auto visit_all = [&](int begin, int end, int thread) {
@@ -261,8 +261,10 @@ void Grower::commit(bool refit) {
         Checkpoints checkpoints;
         for (std::size_t thread = 0; thread < threads; ++thread) {
             std::vector<Offer>& offers = offers_[thread * threads + static_cast<std::size_t>(owner)];
-            for (const auto& [p, i] : offers) {
+            for (std::size_t k = 0; k < offers.size(); ++k) {
                 checkpoints.pass();
+                patches_.prefetch(offers[std::min(k + prefetched, offers.size() - 1)].pixel);
+                const auto [p, i] = offers[k];
                 patches_.take(p, i);
                 came_[p] = round_;
                 if (!refit) continue;

@@ -101,7 +101,7 @@ struct Line {
         const double q = ordinate(k);
         return {frame->noise.sigma(q, p, frame->projective), frame->noise.waves_at(q, p, frame->projective)};
     }
-    SampleNoise noise_between(int i, int k) const { return mean(noise_at(i), noise_at(k)); }
+    SampleNoise noise_between(int i, int k) const { return mean_of(noise_at(i), noise_at(k)); }
     SampleNoise noise_of(const Segment& s) const { return noise_between(s.left_middle(), s.right_middle()); }
     double tolerance_at(int k) const { return scale ? 1 / static_cast<double>(scale[k]) : tolerance; }
 

@@ -98,9 +98,12 @@ typename Merger<T, List>::Sides Merger<T, List>::sides_without(int i, const Arra
     sides.left = list_.sums(before), sides.right = list_.sums(after);
     if (sides.cut >= s.first) sides.left = sides.left + List::sums_over(line, {s.first, sides.cut});
     if (sides.cut < s.last) sides.right = List::sums_over(line, {sides.cut + 1, s.last}) + sides.right;
-    const double deviation = list_.noise().join[s.size()] * line.noise_of(s).of_fit(s.size());
-    const double joint =
-        residual_squares(sides.left, least_of(i, sides.left)) + residual_squares(sides.right, least_of(i, sides.right));
+    const SampleNoise noise = line.noise_of(s);
+    const double deviation = list_.noise().join[s.size()] * noise.of_fit(s.size());
+    const auto residual_of = [&](const Sums& sums) {
+        return residual_squares(sums, least_quadratic(noise, static_cast<int>(sums.n), line.noise->slope));
+    };
+    const double joint = residual_of(sides.left) + residual_of(sides.right);
     const double rise = joint - (residual(before) + residual(i) + residual(after));
     const double cost = rise / (deviation * deviation);
     if (cost < bridge_factor * bridge_factor * limit_) sides.cost = cost;

@@ -2,6 +2,7 @@
 #include "scanline/split.hpp"
 
 #include <cmath>
+#include <cstdint>
 #include <type_traits>
 
 #include "base/simd.hpp"
@@ -100,18 +101,18 @@ Ends worst_samples(const Samples<T>& line, const Segment& s) {
     return worst;
 }
 
-// The same for samples one unit apart, sixteen at a time: each lane keeps its own worst.
-template <int bytes>
-RANGEEDGE_INLINE Ends worst_samples_in(const Samples<float>& line, const Segment& s) {
-    using F = Floats<bytes>;
-    using I = Ints<bytes>;
-    const ThreePoint<float> curve(line, s);
+// The same for samples one unit apart, several at a time: each lane keeps its own worst.
+template <int bytes, class T>
+RANGEEDGE_INLINE Ends worst_samples_in(const Samples<T>& line, const Segment& s) {
+    using F = Lanes<T, bytes>;
+    using I = Lanes<std::conditional_t<sizeof(T) == 4, std::int32_t, std::int64_t>, bytes>;
+    const ThreePoint<T> curve(line, s);
     const F ym = F::all(curve.ym), a = F::all(curve.a), b = F::all(curve.b);
     const I beyond = I::all(s.last), before = I::all(-1);
     F worst = F::all(-1);
     I first = beyond, last = before;
     const auto look = [&](int k, int count) RANGEEDGE_ALWAYS {
-        const F t = F::from(static_cast<float>(k - curve.m));
+        const F t = F::from(static_cast<T>(k - curve.m));
         F r = abs(F::load(line.y + k) - (ym + t * (b + a * t)));
         if (line.scale) r *= F::load(line.scale + k);
         if (count < F::count) r = keep_first(r, count);
@@ -126,7 +127,7 @@ RANGEEDGE_INLINE Ends worst_samples_in(const Samples<float>& line, const Segment
     int k = s.first + 1;
     for (; k + F::count <= s.last; k += F::count) look(k, F::count);
     if (k < s.last) look(k, s.last - k);
-    const float largest = worst.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; });
+    const T largest = worst.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; });
     if (!(largest > line.eps)) return {};
     // Of the lanes that have it, without branches: which these are cannot be foretold.
     const F everywhere = F::all(largest);
@@ -135,27 +136,30 @@ RANGEEDGE_INLINE Ends worst_samples_in(const Samples<float>& line, const Segment
         first.part[p] = here ? first.part[p] : beyond.part[p];
         last.part[p] = here ? last.part[p] : before.part[p];
     }
-    return {first.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p < q ? p : q; }),
-            last.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; })};
+    return {static_cast<int>(first.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p < q ? p : q; })),
+            static_cast<int>(last.reduce([](auto p, auto q) RANGEEDGE_ALWAYS { return p > q ? p : q; }))};
 }
 
 // Of `count` pending nodes, those to be cut; returns how many. Lines without abscissae.
-template <int bytes>
-RANGEEDGE_INLINE std::ptrdiff_t find_worst_of_even_in(const Samples<float>* lines, const Splitter<float>::Node* nodes,
+template <int bytes, class T>
+RANGEEDGE_INLINE std::ptrdiff_t find_worst_of_even_in(const Samples<T>* lines, const typename Splitter<T>::Node* nodes,
                                                       const int* pending, std::ptrdiff_t count,
-                                                      Splitter<float>::Worst* worst) {
+                                                      typename Splitter<T>::Worst* worst) {
     std::ptrdiff_t found = 0;
     for (std::ptrdiff_t i = 0; i < count; ++i) {
-        const Splitter<float>::Node& node = nodes[pending[i]];
+        const typename Splitter<T>::Node& node = nodes[pending[i]];
         const Ends samples = worst_samples_in<bytes>(lines[node.line], node.segment);
         if (samples.first >= 0) worst[found++] = {pending[i], samples.first, samples.last};
     }
     return found;
 }
-RANGEEDGE_VERSIONS(std::ptrdiff_t, find_worst_of_even,
-                   (const Samples<float>* lines, const Splitter<float>::Node* nodes, const int* pending,
-                    std::ptrdiff_t count, Splitter<float>::Worst* worst),
-                   (lines, nodes, pending, count, worst))
+#define RANGEEDGE_FIND_WORST(T)                                                                      \
+    RANGEEDGE_VERSIONS(std::ptrdiff_t, find_worst_of_even,                                           \
+                       (const Samples<T>* lines, const Splitter<T>::Node* nodes, const int* pending, \
+                        std::ptrdiff_t count, Splitter<T>::Worst* worst),                            \
+                       (lines, nodes, pending, count, worst))
+RANGEEDGE_FIND_WORST(float)
+RANGEEDGE_FIND_WORST(double)
 
 // The sample behind which a segment is cut at an extreme one: that joins the neighbour it is closer to, of equally
 // close ones the one farther from the middle.
@@ -202,12 +206,10 @@ void Splitter<T>::add(const Samples<T>& line) {
 template <class T>
 void Splitter<T>::find_worst() {
     worst_.resize(pending_.size());
-    if constexpr (std::is_same_v<T, float>) {
-        if (!lines_[0].x) {
-            worst_.resize(
-                find_worst_of_even(lines_.data(), nodes_.data(), pending_.data(), pending_.size(), worst_.data()));
-            return;
-        }
+    if (!lines_[0].x) {
+        worst_.resize(
+            find_worst_of_even(lines_.data(), nodes_.data(), pending_.data(), pending_.size(), worst_.data()));
+        return;
     }
     std::ptrdiff_t found = 0;
     for (const int node : pending_) {
