@@ -21,8 +21,8 @@ struct EdgeMaps {
     float* significance;
 };
 
-// The maps hold zeros where there are none. Of equal creases, convex. The order of candidates decides nothing but how evenly threads
-// share them: they should lie row by row.
+// The maps hold zeros where there are none. Of equal creases, convex. The order of candidates decides nothing but how
+// evenly threads share them: they should lie row by row.
 void combine(const std::vector<Candidate>& candidates, const EdgeMaps& maps, Team& team);
 
 }  // namespace rangeedge
