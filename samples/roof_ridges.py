@@ -4,10 +4,10 @@ Roofs of a surface model, to a map
 
     python samples/roof_ridges.py [IMAGE] [--out DIR]
 
-Ridges and eaves of houses, from a surface model to a map in GeoJSON.
+Ridges, eaves and verges (the eaves along gables) of houses, from a surface model to a map in GeoJSON.
 
 An IMAGE with a georeference (GeoTIFF, ASCII grid) gives lines in its coordinates. Without one the sample makes three
-houses with gable roofs, and prints how far ridges and eaves are from the truth.
+houses with gable roofs, of six such lines and a ridge each, and prints how far these are from the truth.
 """
 
 import argparse
@@ -71,7 +71,7 @@ def main(argv=None):
 
     found = rangeedge.fitSegments(rangeedge.linkEdges(src, creaseThreshold=25, **geometry))
     segments = found.segments[np.isin(found.segments["kind"], (EDGE_CONVEX, EDGE_JUMP))]
-    kinds = {EDGE_CONVEX: "ridges", EDGE_JUMP: "eaves"}
+    kinds = {EDGE_CONVEX: "ridges", EDGE_JUMP: "eaves and verges"}
     off = off_the_truth(segments) if rendered else {}
     for kind, name in kinds.items():
         own = segments[segments["kind"] == kind]

@@ -246,7 +246,7 @@ def test_what_is_no_kernel_is_given_up_as_well():
             lambda: read_frame(z, ScanLineParams(invalid=0)),
             lambda: question_geometry(z, frame, ScanLineParams()),
             lambda: select_strength(strength, Selection()),
-            lambda: select_maps(strength.jump, strength.crease, Selection(minLength=1)),
+            lambda: select_maps(strength.jump, strength.crease, strength.kind, None, Selection(minLength=1)),
         ):
             with pytest.raises(CancelledError):
                 call()

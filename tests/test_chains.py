@@ -356,3 +356,11 @@ def test_an_edge_straight_in_the_image_ends_where_it_turns_in_space(depth_along,
         place = chain.points["point"]
         assert distance_to_line(place, place[0], place[-1]).max() < (3 if parts > 1 else 20)
     assert sum(len(chain) for chain in jumps) >= 85
+
+
+@pytest.mark.parametrize("radius", [4, 6, 8])
+def test_the_outline_of_a_small_disc_is_closed(radius):
+    y, x = np.mgrid[:40, :40] - 19.5
+    (chain,) = linkEdges(np.where(np.hypot(x, y) < radius, 1.0, 2.0), pixelSize=0.01, noise=0.001)
+    assert chain.closed
+    assert 8 <= len(chain.points) < 80

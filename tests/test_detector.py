@@ -112,9 +112,9 @@ def test_tiny_images_have_no_edges(dtype, shape):
 
 @pytest.mark.parametrize("function", [detectEdges, edgeStrength])
 def test_images_too_large_to_count_are_refused(function):
-    for shape in ((46340, 46340), (720_000_000, 1)):
+    for shape in ((23170, 23170), (46340, 46340), (180_000_000, 1)):
         huge = np.broadcast_to(np.float32(1), shape)
-        with pytest.raises(rangeedge.error, match=r"`src` must be .* of fewer than 2\^31 pixels"):
+        with pytest.raises(rangeedge.error, match=r"`src` must be .* of fewer than 2\^29 pixels"):
             function(huge)
 
 

@@ -177,6 +177,9 @@ class TestGrowing:
         markers = markers_at(src.shape, (slice(50, 70), slice(10, 30)), (slice(22, 27), slice(22, 27)))
         assert growRegions(src, markers, noise=SIGMA, minArea=50)[24, 24] > 0
         assert growRegions(src, markers, noise=SIGMA, minArea=100)[24, 24] == 0
+        area = np.count_nonzero(growRegions(src, markers, noise=SIGMA, minArea=50)[20:29, 20:29] == 2)
+        for least, stays in ((area, True), (area + 1, False)):
+            assert (growRegions(src, markers, noise=SIGMA, minArea=least)[24, 24] == 2) == stays
 
     def test_invalid_pixels_have_no_label(self):
         src = ROOF.copy()

@@ -125,7 +125,8 @@ def test_toes_of_the_weld_are_found_within_twenty_micrometres(tmp_path):
 
 def test_ridges_and_eaves_lie_on_the_map(tmp_path):
     off = run("roof_ridges", "--out", tmp_path)
-    assert sorted(len(own) for own in off.values()) == [3, 12]
+    assert len(off[EDGE_CONVEX]) == 3
+    assert 16 <= len(off[EDGE_JUMP]) <= 18  # two eaves and four verges a house, which meet below the ends of the ridge
     assert max(off[EDGE_CONVEX]) < 0.05
     assert max(off[EDGE_JUMP]) < 0.25  # a pixel
     lines = readLines(tmp_path / "roof_ridges.geojson")

@@ -135,7 +135,7 @@ public:
             const auto [length, p] = queue_.top();
             queue_.pop();
             if (length > length_[at(p)]) continue;
-            for_each_neighbour(p, [&](std::int32_t q, const Offset& step) { offer(p, q, step); });
+            for_each_neighbour(p, [&, p = p](std::int32_t q, const Offset& step) { offer(p, q, step); });
         }
     }
 

@@ -146,7 +146,7 @@ private:
         to.resize(count + pixels.size());
         for (const int p : pixels) {
             to[count] = p;
-            count += wanted(p);
+            count += static_cast<std::size_t>(wanted(p));
         }
         to.resize(count);
     }
@@ -198,8 +198,9 @@ private:
             group.swap(by_depth_[least]);
             for (const int from : {south, north, east, west}) {
                 side.clear();
-                append_if(group, side,
-                          [&](int p) { return !is_set(p + offsets_[at(from)]) & from_here(ring<on>(p), from); });
+                append_if(group, side, [&](int p) {
+                    return int{!is_set(p + offsets_[at(from)])} & int{from_here(ring<on>(p), from)};
+                });
                 for (const int p : side) {
                     checkpoints_.pass();
                     if (!is_set(p) || !kinds[ring<on>(p)].may_go()) continue;

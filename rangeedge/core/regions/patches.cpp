@@ -247,7 +247,7 @@ bool PatchMap::cut_roofs() {
     if (!candidates) return false;
     const std::vector<Pixels> sets = pixels_of(number, candidates);
     std::vector<std::vector<Piece>> pieces(sets.size());
-    Array<int> owner(sets.size());
+    Array<int> owner(candidates);
     for (int i = 1; i < count(); ++i)
         if (number[i]) owner[number[i] - 1] = i;
     parallel_each(candidates, team_, [&](int i, int) {
