@@ -113,12 +113,15 @@ def fitArcs(
 
 
 def arc_points(arc: np.void) -> np.ndarray:
-    """Points along an arc, (N, 3); around a whole circle the first is not repeated."""
+    """Points along an arc, (N, 3); around a whole circle the first is not repeated. None of one that is not finite."""
+    numbers = (arc["center"], arc["ends"], arc["normal"], arc["angle"])
+    if not all(np.isfinite(number).all() for number in numbers):
+        return np.zeros((0, 3))
     start = arc["ends"][0] - arc["center"]
     other = np.cross(arc["normal"], start)
-    whole = arc["angle"] >= 360
-    angles = np.radians(np.linspace(0, arc["angle"], int(np.ceil(arc["angle"] / _STEP)) + 1, endpoint=True))
-    angles = angles[: -1 if whole else None]
+    degrees = float(np.clip(arc["angle"], 0, 360))
+    angles = np.radians(np.linspace(0, degrees, int(np.ceil(degrees / _STEP)) + 1))
+    angles = angles[: -1 if degrees == 360 else None]
     return arc["center"] + np.outer(np.cos(angles), start) + np.outer(np.sin(angles), other)
 
 

@@ -208,6 +208,11 @@ REGIONS = (SCENE > 1.5).astype(np.int32) + 1
 BOUNDARIES = rangeedge.regionBoundaries(REGIONS, SCENE)
 BROKEN = SEGMENTS.copy()
 BROKEN["pixels"], BROKEN["ends"], BROKEN["vertices"] = np.inf, np.nan, 10**6
+HOLE = np.where(np.hypot(*np.ogrid[-12:12, -16:17]) < 9, 2.0, 1.0)
+RIMS = rangeedge.linkEdges(HOLE, noise=0.001)
+ARCS = rangeedge.fitArcs(RIMS)
+BROKEN_ARCS = ARCS.copy()
+BROKEN_ARCS["center"], BROKEN_ARCS["ends"], BROKEN_ARCS["angle"] = np.nan, np.inf, np.inf
 EXPLAINED = [rangeedge.explainPixel(SCENE, x, 3, reach=reach) for x, reach in ((14, 20), (0, 3), (20, 40))]
 PICTURE = np.zeros((24, 33, 3), np.uint8)
 MADE = {
@@ -217,9 +222,11 @@ MADE = {
     ("drawChains", "chains"): [CHAINS, CHAINS[:0]],
     ("drawSegments", "segments"): [SEGMENTS, SEGMENTS[:0], BROKEN],
     ("drawSegments", "vertices"): [VERTICES, VERTICES[:0]],
+    ("fitArcs", "chains"): [RIMS, list(RIMS), CHAINS, RIMS[:0]],
+    ("drawArcs", "arcs"): [ARCS, ARCS[:0], BROKEN_ARCS],
     ("drawBoundaries", "boundaries"): [BOUNDARIES],
     ("drawEdges", "kind"): [STRENGTH.kind],
-    ("toLines", "lines"): [CHAINS, list(CHAINS), SEGMENTS, BROKEN, BOUNDARIES],
+    ("toLines", "lines"): [CHAINS, list(CHAINS), SEGMENTS, BROKEN, ARCS, BROKEN_ARCS, BOUNDARIES],
     ("drawPanels", "panels"): [[("a", PICTURE)], [("a", PICTURE), ("x\udcff", PICTURE[:9, :5, 0])]],
     ("drawExplanation", "explanation"): EXPLAINED,
     ("mapFrames", "function"): [rangeedge.detectEdges, rangeedge.edgePoints, rangeedge.thinEdges],

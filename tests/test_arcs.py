@@ -164,6 +164,18 @@ def test_a_hole_is_drawn_and_written(tmp_path):
         np.testing.assert_allclose(read.points, line.points, atol=1e-6)
 
 
+@pytest.mark.parametrize("name", ["center", "normal", "ends", "angle"])
+def test_of_an_arc_that_is_not_finite_nothing_is_drawn_or_written(name, tmp_path):
+    arcs = fitArcs([chain_of(circle((0, 0, 1), (0, 0, 1), 1))])
+    for value in (np.nan, np.inf):
+        broken = arcs.copy()
+        broken[name] = value
+        assert toLines(broken) == []
+        drawArcs(np.zeros((8, 8, 3), np.uint8), broken, pixelSize=1)
+        for suffix in ("csv", "ply", "obj", "geojson"):
+            writeLines(tmp_path / f"arc.{suffix}", broken)
+
+
 @pytest.mark.parametrize(
     ("call", "text"),
     [

@@ -173,6 +173,12 @@ def test_nothing_to_write_is_a_valid_file(suffix, tmp_path):
     assert readLines(tmp_path / f"none.{suffix}") == []
 
 
+def test_a_line_without_points_has_no_edges_in_ply(tmp_path):
+    lines = [Line("jump", closed, np.zeros((0, 2)), np.zeros((0, 3)), {}) for closed in (False, True)]
+    writeLines(tmp_path / "none.ply", lines)
+    assert readLines(tmp_path / "none.ply") == []
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_files_of_something_else_are_refused(suffix, tmp_path):
     if suffix == "dxf":

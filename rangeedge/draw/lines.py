@@ -197,7 +197,10 @@ def drawArcs(
         raise fail("arcs", "a structured array from fitArcs", described(arcs))
     canvas, scale = canvas_of(src, scale, geometry)
     for arc in arcs:
-        places = project(arc_points(arc), **geometry)[:, :2]
+        points = arc_points(arc)
+        if not len(points):
+            continue
+        places = project(points, **geometry)[:, :2]
         center = project(arc["center"], **geometry)[:2]
         if np.isfinite(places).all():
             _line(canvas, places, int(arc["kind"]), scale, closed=bool(arc["angle"] >= 360))

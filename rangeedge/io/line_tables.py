@@ -78,7 +78,7 @@ def write_ply(lines: list[Line]) -> bytes:
             vertices[name] = column
     edges = []
     for line, first in zip(lines, np.cumsum(counts) - counts, strict=True):
-        own = np.zeros(len(line.points) - (not line.closed), _EDGE)
+        own = np.zeros(max(len(line.points) - (not line.closed), 0), _EDGE)
         own["vertex1"] = first + np.arange(len(own))
         own["vertex2"] = first + (np.arange(len(own)) + 1) % len(line.points)
         own["kind"], own["angle"] = kind_bits(line.kind), line.angle

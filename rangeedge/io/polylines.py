@@ -119,7 +119,8 @@ def _of_arcs(arcs: np.ndarray) -> Iterator[Line]:
         known: dict[str, Any] = {name: float(arc[name]) for name in names}
         known.update(center=arc["center"].tolist(), normal=arc["normal"].tolist())
         points = arc_points(arc)
-        yield Line(kindNames(int(arc["kind"])), bool(arc["angle"] >= 360), no_pixels(points), points, known)
+        if len(points):
+            yield Line(kindNames(int(arc["kind"])), bool(arc["angle"] >= 360), no_pixels(points), points, known)
 
 
 def _of_rings(boundaries: RegionBoundaries) -> Iterator[Line]:
