@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import cv2
 import numpy as np
 
+from . import _core
 from ._check import fail, integer
 from ._option import parsed, takes
 from .constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, EDGE_OCCLUDING
@@ -27,11 +28,9 @@ if TYPE_CHECKING:
 
     from ._typed import DetectionOptions
 
-_USUAL_LENGTH = 10  # of a line, as core/edges/select.cpp has it
 _EVERYTHING: dict[str, Any] = {"minLength": 1, "lineSignificance": 0.0, "dynamic": False}
 _RAISED, _LOWERED = 1.001, 0.999  # past a limit, beyond the rounding of the maps
 _NAN = float("nan")
-_COMPANY = 4  # creases of the nine pixels around one that stays, as core/edges/select.cpp has it
 _TESTS = ("gap", "single", "smooth", "smeared", "significance")  # in the order in which cuts get to them
 
 
@@ -250,19 +249,20 @@ class _Case:
             beside = self.strength.crease[max(self.y - 1, 0) : self.y + 2, max(self.x - 1, 0) : self.x + 2]
             strong = np.sort(beside[beside > 0])[::-1]
             count = int(np.count_nonzero(strong >= np.float32(least)))
-            if count >= _COMPANY or self.jump > 0:
+            if count >= _core.company or self.jump > 0:
                 text = "No pixel of its line reaches the thresholds, only hysteresis times these."
                 return _Verdict("line", text, own.hysteresis, 1, ({"creaseThreshold": _below(self.crease)},))
-            lower = {"creaseThreshold": _below(float(strong[_COMPANY - 1]))} if len(strong) >= _COMPANY else {}
-            text = f"A stray crease: of the nine pixels around it {count} reach creaseThreshold, {_COMPANY} are needed."
-            return _Verdict("stray", text, count, _COMPANY, (lower, {**lower, **_EVERYTHING}))
+            needed = _core.company
+            lower = {"creaseThreshold": _below(float(strong[needed - 1]))} if len(strong) >= needed else {}
+            text = f"A stray crease: of the nine pixels around it {count} reach creaseThreshold, {needed} are needed."
+            return _Verdict("stray", text, count, needed, (lower, {**lower, **_EVERYTHING}))
         length = self._length(self._with_pixel(lines))
         if length < own.minLength:
             text, shorter = f"Its line is {length} pixels long; minLength is {own.minLength}.", {"minLength": length}
             return _Verdict("line", text, length, own.minLength, (shorter, {**shorter, "lineSignificance": 0.0}))
         line = self._with_pixel(around(self.frame, _widened, lines)) & (lines > 0)
         squares = np.square(self.strength.significance[line], dtype=np.float64)
-        whole = float(np.sqrt(squares.mean() * self._length(line) / _USUAL_LENGTH))
+        whole = float(np.sqrt(squares.mean() * self._length(line) / _core.usual_length))
         if whole < own.lineSignificance:
             text = f"The significance of its line is {whole:.3g}; lineSignificance is {own.lineSignificance:g}."
             return _Verdict("line", text, whole, own.lineSignificance, ({"lineSignificance": _below(whole)},))

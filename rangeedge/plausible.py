@@ -133,6 +133,11 @@ def _warn_of_camera(K: np.ndarray, shape: tuple[int, ...]) -> None:
             f"K has the focal lengths {K[0, 0]:g}, {K[1, 1]:g} and the centre {K[0, 2]:g}, {K[1, 2]:g}: hardly in"
             f" pixels of an image of {shape[1]} x {shape[0]}"
         )
+    elif (np.diag(K)[:2] < size).all() and (K[:2, 2] > size).any():
+        warn(
+            f"K has its centre {K[0, 2]:g}, {K[1, 2]:g} outside the image of {shape[1]} x {shape[0]}, where its focal"
+            f" lengths {K[0, 0]:g}, {K[1, 1]:g} lie: its order is fx, fy, cx, cy"
+        )
 
 
 def _warn_of_form(src: np.ndarray, frame: Frame, plain: bool) -> None:

@@ -23,7 +23,6 @@ _CUT = (
     *("jumpSignificance", "jumpShared", "creaseSignificance", "creaseShared"),
     *("jumps", "smooth", "bends", "convex", "smeared", "outline", "passed"),
 )  # as core/edges/trace.hpp has them
-_LONE = 3.0  # standard deviations that a candidate needs by itself, as core/edges/detect.cpp has it
 Candidates = dict[str, np.ndarray]
 
 
@@ -198,7 +197,7 @@ class _Line:
             )
         if c["smooth"] or c["bends"]:
             return _Fate("smooth", 0.0, 0.0, "", f"{what} is what curves make of samples that run on smoothly")
-        lone = min(_LONE, least)
+        lone = min(_core.lone_significance, least)
         value = max(c["jumpSignificance"] if c["jump"] else 0.0, c["creaseSignificance"])
         text = f"{what} is {value:.3g} deviations of the noise by itself; {lone:g} are needed"
         return _Fate("single", value, lone, "minSignificance", text)

@@ -25,6 +25,7 @@ from rangeedge import (
     imreadRange,
     imwriteRange,
     linkEdges,
+    readLines,
     segmentRegions,
     segmentRegionsWithStats,
 )
@@ -338,7 +339,6 @@ class TestBadInput:
         assert list(out.iterdir()) == []
 
     def test_command_is_required(self, capsys):
-        assert run(capsys)[0] == 2
         assert run(capsys, "sharpen")[0] == 2
         assert run(capsys, "detect", "--out", "x")[0] == 2
 
@@ -508,6 +508,30 @@ def test_lines_writes_chains_and_segments(image, tmp_path, capsys):
     assert picture.shape[1] == 1200
     assert picture.shape[0] >= 900 + 2 * 28  # a title above, the key below
     assert {(0, 94, 213), (66, 228, 240), (233, 180, 86)} <= set(map(tuple, picture[-20, :400].tolist()))
+
+
+def test_lines_tells_which_chains_are_not_straight_and_divides_them(image, tmp_path, capsys):
+    chains = linkEdges(imreadRange(image).src, K=K, cornerAngle=180)
+    bent = len(chains) - len(np.unique(fitSegments(chains).segments["chain"]))
+    whole = ("lines", image, *CAMERA, "--corner-angle", "180")
+    code, said, _ = run(capsys, *whole, "--out", tmp_path / "a.csv")
+    assert code == 0
+    assert bent > 0
+    assert f"{bent} chains have no segment" in said
+    assert f"{tmp_path / 'a.csv'}: the chains as they run" in said
+    code, said, _ = run(capsys, *whole, "--tolerance", "0.02", "--straight", "--out", tmp_path / "b.csv")
+    assert code == 0
+    assert f"{tmp_path / 'b.csv'}: the straight segments" in said
+    segments = fitSegments(chains, 0.02).segments
+    assert len(readLines(tmp_path / "b.csv")) == len(segments) > len(fitSegments(chains).segments)
+    assert run(capsys, *whole, "--tolerance", "-1", "--out", tmp_path / "c.csv")[0] == 2
+    assert not (tmp_path / "c.csv").exists()
+
+
+def test_without_a_command_the_help_is_shown(capsys):
+    code, said, complaint = run(capsys)
+    assert (code, complaint) == (0, "")
+    assert "rangeedge demo" in said
 
 
 def test_lines_takes_the_options_of_linking(image, tmp_path, capsys):

@@ -180,6 +180,7 @@ CAMERA = np.random.default_rng(5).random((480, 640))
         (np.where(HOLES, 1e10, Z).astype("f4"), {"K": K}, "20 of .* are exactly 1e.10"),
         (Z, {"K": (0.0035, 0.0035, 0.0024, 0.0018)}, "hardly in pixels of an image"),
         (Z, {"K": (140, 140, 3190, 59.5)}, "hardly in pixels of an image"),
+        (Z, {"K": (39.5, 29.5, 140, 140)}, "its order is fx, fy, cx, cy"),
         (np.full((128, 1024), 1500, np.uint16), {}, "range image of a scanner that turns .*sweepToPoints"),
         (np.where(CAMERA < 0.05, np.nan, 2 + CAMERA / 10), {}, "looks like the image of a depth camera"),
     ],

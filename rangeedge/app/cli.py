@@ -90,7 +90,8 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"rangeedge {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    parser.set_defaults(run=lambda _: print(parser.format_help(), end="") or 0, parser=parser)
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND")
 
     detect = _command(commands, "detect", _detect, "find the edges of one range image")
     detect.add_argument("image", metavar="IMAGE", help=INPUT)
@@ -110,6 +111,22 @@ def _parser() -> argparse.ArgumentParser:
     _add_out(lines, "or the name of a file of lines")
     _add_geometry(lines)
     _add_options(lines, "how lines are linked", Linking.options)
+    straight = lines.add_argument_group("straight segments")
+    straight.add_argument(
+        "--tolerance",
+        dest="off_straight",
+        type=float,
+        default=None,
+        metavar="D",
+        help="a length: divide chains into segments that their points are at most so far off (default: only chains"
+        " that are straight in the image have one)",
+    )
+    straight.add_argument(
+        "--straight",
+        action="store_true",
+        default=False,
+        help="into a single file the segments, not the chains as they run",
+    )
     _add_detector(lines)
 
     clean = _command(commands, "clean", _clean, "fill the holes of one range image and smooth its surfaces")
@@ -281,6 +298,7 @@ def _mask(text: str) -> np.ndarray:
 
 _NOT_OPTIONS = {
     *("run", "parser", "image", "params", "out", "real", "repeat", "json", "at", "host", "port", "no_browser"),
+    *("off_straight", "straight"),
     *BATCH_ARGUMENTS,
 }
 
@@ -321,14 +339,19 @@ def _lines(args: argparse.Namespace) -> int:
 
     options = _options(args)
     image = read_image(args.image, options)
-    found = find_lines(image.src, **image.geometry)
+    found = find_lines(image.src, tolerance=args.off_straight, **image.geometry)
     alone = is_line_file(args.out)
     if alone:
-        _write_lines(args.out, found.chains, image)
+        _write_lines(args.out, found.segments if args.straight else found.chains, image)
     else:
         write_folder(args.out, line_files(found, args.image, options, image))
     _say_seen(args.image, found.frame, found.known, f"{len(found.chains)} chains, {len(found.segments)} segments")
-    if not alone:
+    if found.bent:
+        reason = "short" if args.off_straight else "not straight, or short: --tolerance divides them"
+        print(f"{found.bent} chains have no segment, as they are {reason}")
+    if alone:
+        print(f"{args.out}: {'the straight segments' if args.straight else 'the chains as they run'}")
+    else:
         _say_written(args.out, LINE_FILES)
     return 0
 

@@ -45,16 +45,23 @@ class LineResults(NamedTuple):
     vertices: np.ndarray
     known: dict[str, Any]
 
+    @property
+    def bent(self) -> int:
+        """How many chains have no segment."""
+        return len(self.chains) - len(np.unique(self.segments["chain"]))
+
 
 @named("linkEdges")
 @takes(LINKING)
-def find_lines(src: np.ndarray, *, mask: np.ndarray | None = None, **options: Any) -> LineResults:
+def find_lines(
+    src: np.ndarray, *, mask: np.ndarray | None = None, tolerance: float | None = None, **options: Any
+) -> LineResults:
     """The chains of an image, their segments, and what is known of the image."""
     params, selection, linking = parsed(options, ScanLineParams, Selection, Linking)
     frame = measured_frame(src, params, mask)
     warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
     chains = link_frame(frame, params, selection, linking)
-    segments, vertices = fitSegments(chains)
+    segments, vertices = fitSegments(chains, tolerance)
     return LineResults(frame, chains, segments, vertices, understood(frame, params, selection, src))
 
 
@@ -75,6 +82,7 @@ def line_files(found: LineResults, title: str, options: Mapping[str, Any], image
         "chains": len(found.chains),
         "points": len(found.chains.points),
         "segments": len(found.segments),
+        "chainsWithoutSegment": found.bent,
         "vertices": len(found.vertices),
         "understood": plain(found.known),
         "noise": plain(found.frame.noise),

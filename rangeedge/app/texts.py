@@ -65,7 +65,8 @@ EPILOGUES = {
     "lines": """examples:
   rangeedge lines depth.png -K 525,525,319.5,239.5 --out lines
   rangeedge lines terrain.tiff --pixel-size 0.5 --height-map --corner-angle 20 --out lines
-  rangeedge lines terrain.tiff --out ridges.geojson    # or .csv, .ply, .obj, .dxf, .svg: the chains alone""",
+  rangeedge lines terrain.tiff --out ridges.geojson    # or .csv, .ply, .obj, .dxf, .svg: the chains alone
+  rangeedge lines depth.png -K 525,525,319.5,239.5 --tolerance 0.01 --straight --out box.dxf""",
     "clean": """examples:
   rangeedge clean depth.png -K 525,525,319.5,239.5 --out cleaned.png
   rangeedge clean terrain.tiff --max-hole 40 --radius 0 --out filled.tiff""",

@@ -19,10 +19,9 @@
 namespace rangeedge {
 namespace {
 
-constexpr double lone_significance = 3;  // standard deviations that a candidate needs by itself, before its neighbours
-constexpr double lone_jump = 8;          // standard deviations that a jump needs by itself
-constexpr double jump_tolerances = 2;    // tolerances of splitting that a jump exceeds, the error of approximation
-constexpr int least_outlined = 3;        // samples of a surface beside a wide gap
+constexpr double lone_jump = 8;        // standard deviations that a jump needs by itself
+constexpr double jump_tolerances = 2;  // tolerances of splitting that a jump exceeds, the error of approximation
+constexpr int least_outlined = 3;      // samples of a surface beside a wide gap
 
 // Candidates of some lines, and the pixels over which steps are smeared there.
 struct Found {

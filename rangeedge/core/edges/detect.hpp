@@ -18,6 +18,8 @@
 
 namespace rangeedge {
 
+constexpr double lone_significance = 3;  // standard deviations that a candidate needs by itself, before its neighbours
+
 // All candidates, by their place in the image; the same for any number of threads. `smeared`, unless null, becomes 255
 // at pixels over which a step is smeared (smear.hpp); it holds zeros before. `weak`, unless null, receives the
 // candidates that were dropped because they and their neighbours are not significant.

@@ -14,9 +14,6 @@
 namespace rangeedge {
 namespace {
 
-constexpr int company = 4;           // creases of the nine pixels around one that stays, itself among them
-constexpr double usual_length = 10;  // of the line whose significance is that of its pixels
-
 // The least strength that reaches a threshold, which may be 0 or more than a float holds.
 float least_reaching(double threshold) {
     using Limits = std::numeric_limits<float>;

@@ -12,6 +12,9 @@
 
 namespace rangeedge {
 
+constexpr int company = 4;           // creases of the nine pixels around one that stays, itself among them
+constexpr double usual_length = 10;  // of the line whose significance is that of its pixels
+
 // Maps of strengths, 0 where there is no edge. `kind` is null where every jump and every crease counts by itself.
 struct Strengths {
     const float *jump, *crease;

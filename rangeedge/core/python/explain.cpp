@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "edges/detect.hpp"
+#include "edges/select.hpp"
 #include "edges/trace.hpp"
 #include "python/candidates.hpp"
 #include "python/frame.hpp"
@@ -35,6 +36,9 @@ nb::tuple traced_line(const BoundFrame& bound, const ScanLineOptions& options, i
 }  // namespace
 
 void bind_explain(nb::module_& m) {
+    m.attr("lone_significance") = lone_significance;
+    m.attr("company") = company;
+    m.attr("usual_length") = usual_length;
     m.def("kept_and_weak", &kept_and_weak, "frame"_a, "options"_a, "threads"_a);
     m.def("trace_line", &traced_line, "frame"_a, "options"_a, "direction"_a, "col"_a, "row"_a);
 }
