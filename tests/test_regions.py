@@ -1,5 +1,7 @@
 """Regions: hand cases, properties, surfaces, and figures on real and rendered scenes."""
 
+import time
+
 import cv2
 import numpy as np
 import pytest
@@ -222,6 +224,24 @@ class TestSegmentation:
         finally:
             cv2.setNumThreads(threads)
         assert all(np.array_equal(results[0], r) for r in results)
+
+    def test_many_threads_cost_little_where_growth_is_slow(self):
+        """A path of three pixels across, along which thousands of rounds have a pixel or two each."""
+        depth = 1 + 0.001 * np.random.default_rng(0).standard_normal((800, 800))
+        walls, markers = np.zeros(depth.shape, np.uint8), np.zeros(depth.shape, np.int32)
+        walls[3::8, :-3] = walls[7::8, 3:] = 255
+        markers[:3, :6] = 1
+        threads, seconds, results = cv2.getNumThreads(), [], []
+        try:
+            for n in (1, 128):
+                cv2.setNumThreads(n)
+                start = time.process_time()
+                results.append(growRegions(depth, markers, edges=walls, pixelSize=0.01, noise=0.002))
+                seconds.append(time.process_time() - start)
+        finally:
+            cv2.setNumThreads(threads)
+        assert np.array_equal(*results)
+        assert seconds[1] < seconds[0] + 1.5
 
     @pytest.mark.parametrize("scene", [polyhedraScene, curvedScene])
     def test_threads_share_large_images(self, scene):

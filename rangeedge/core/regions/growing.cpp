@@ -136,14 +136,16 @@ void Grower::take_tile(const Tiles& tiles, int t, int i, const SurfaceSums& sums
             patches_.take(p, i);
 }
 
-// Calls body(thread) for every thread, on all of them if the work is `shared`. Patch i belongs to thread i % threads.
+// How many threads share the patches: all, or one where there is little to do. Patch i belongs to owner i % owners.
+int Grower::owner_count(bool shared) const { return shared ? patches_.team().size() : 1; }
+
+// Calls body(owner) for every owner.
 template <class F>
-void Grower::for_patches(bool shared, F&& body) {
-    const int threads = patches_.team().size();
-    if (shared && threads > 1)
+void Grower::for_owners(int owners, F&& body) {
+    if (owners > 1)
         patches_.team().run(body);
     else
-        for (int thread = 0; thread < threads; ++thread) body(thread);
+        body(0);
 }
 
 void Grower::over_tiles(const Tiles& tiles) {
@@ -175,10 +177,10 @@ void Grower::over_tiles(const Tiles& tiles) {
 // tiles_.
 void Grower::over_tiles(const Tiles& tiles, double limit) {
     rejected_.clear();
-    const int threads = patches_.team().size();
     while (!tiles_.empty()) {
         const int count = static_cast<int>(tiles_.size());
         const bool shared = tiles_.size() >= tiles_worth_threads;
+        const int owners = owner_count(shared);
         choices_.assign(tiles_.size(), {});
         sums_.resize(std::max(sums_.size(), tiles_.size()));
         const auto choose_all = [&](int begin, int end, int) {
@@ -194,9 +196,9 @@ void Grower::over_tiles(const Tiles& tiles, double limit) {
             parallel_for(count, patches_.team(), choose_all);
         else
             choose_all(0, count, 0);
-        for_patches(shared, [&](int thread) {
+        for_owners(owners, [&](int owner) {
             for (std::size_t k = 0; k < tiles_.size(); ++k)
-                if (choices_[k].patch && choices_[k].residual < limit && choices_[k].patch % threads == thread)
+                if (choices_[k].patch && choices_[k].residual < limit && choices_[k].patch % owners == owner)
                     take_tile(tiles, tiles_[k], choices_[k].patch, sums_[k]);
         });
         const std::size_t before = taken_.size();
@@ -254,13 +256,12 @@ void Grower::for_front(F&& visit) {
         visit_all(0, size, 0);
 }
 
-// Offers become true. Every patch belongs to one thread, which adds its pixels in the order of the front.
-void Grower::commit(bool refit) {
-    const auto threads = static_cast<std::size_t>(patches_.team().size());
-    for_patches(front_.size() >= worth_threads, [&](int owner) {
+// Offers become true. Every patch belongs to one owner, which adds its pixels in the order of the front.
+void Grower::commit(int owners, bool refit) {
+    for_owners(owners, [&](int owner) {
         Checkpoints checkpoints;
-        for (std::size_t thread = 0; thread < threads; ++thread) {
-            std::vector<Offer>& offers = offers_[thread * threads + static_cast<std::size_t>(owner)];
+        for (int thread = 0; thread < owners; ++thread) {
+            std::vector<Offer>& offers = offers_[static_cast<std::size_t>(thread * owners + owner)];
             for (std::size_t k = 0; k < offers.size(); ++k) {
                 checkpoints.pass();
                 patches_.prefetch(offers[std::min(k + prefetched, offers.size() - 1)].pixel);
@@ -285,15 +286,15 @@ int Grower::over_front(Choose&& choose, Concerns&& concerns, bool refit) {
         std::fill(came_.begin(), came_.end(), std::uint8_t{0});
         round_ = 1;
     }
-    const auto threads = static_cast<std::size_t>(patches_.team().size());
-    for_front([&](int p, std::size_t thread) {
+    const int owners = owner_count(front_.size() >= worth_threads);
+    for_front([&, every = static_cast<std::size_t>(owners)](int p, std::size_t thread) {
         waiting_[p] = 0;
         const int i = choose(p);
-        if (i) offers_[thread * threads + static_cast<std::size_t>(i) % threads].push_back({p, i});
+        if (i) offers_[thread * every + static_cast<std::size_t>(i) % every].push_back({p, i});
     });
-    std::size_t count = 0;
-    for (const std::vector<Offer>& offers : offers_) count += offers.size();
-    commit(refit);
+    std::size_t went = 0;
+    for (int k = 0; k < owners * owners; ++k) went += offers_[static_cast<std::size_t>(k)].size();
+    commit(owners, refit);
     const std::array<int, 4> around = image_.neighbours();
     for_front([&](int p, std::size_t thread) {
         if (came_[p] != round_) return;
@@ -313,7 +314,7 @@ int Grower::over_front(Choose&& choose, Concerns&& concerns, bool refit) {
     });
     front_.clear();
     gather(front_);
-    return static_cast<int>(count);
+    return static_cast<int>(went);
 }
 
 // Returns how many pixels were taken.

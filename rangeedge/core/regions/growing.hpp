@@ -46,10 +46,11 @@ private:
     Choice choose(const Tiles& tiles, int t, const SurfaceSums& sums) const;
     void take_tile(const Tiles& tiles, int t, int i, const SurfaceSums& sums);
     void refit_when_due(Patch& patch);
+    int owner_count(bool shared) const;
     template <class F>
-    void for_patches(bool shared, F&& body);
+    void for_owners(int owners, F&& body);
     int choose(int p) const;
-    void commit(bool refit);
+    void commit(int owners, bool refit);
     template <class Choose, class Concerns>
     int over_front(Choose&& choose, Concerns&& concerns, bool refit);
     void wait(int p);
@@ -67,7 +68,7 @@ private:
     Array<std::uint8_t> came_;  // round in which a pixel went to its patch
     std::vector<int> front_;
     std::vector<std::vector<int>> found_;     // of every thread: the next front
-    std::vector<std::vector<Offer>> offers_;  // of every thread, to the patches of every thread
+    std::vector<std::vector<Offer>> offers_;  // of every thread, to the patches of every owner
     std::vector<int> tiles_, rejected_, taken_;
     std::vector<SurfaceSums> sums_;  // of tiles_
     std::vector<Choice> choices_;    // of tiles_
