@@ -1,5 +1,8 @@
 """Seeds: peaks of distance maps, against a readable oracle and the watersheds that take them."""
 
+import subprocess
+import sys
+
 import cv2
 import numpy as np
 import pytest
@@ -149,6 +152,25 @@ def test_threads_do_not_matter():
         cv2.setNumThreads(threads)
     assert results[0].max() > 20
     assert all(np.array_equal(results[0], r) for r in results)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the peak is in other units elsewhere, or unknown")
+def test_many_threads_share_their_memory():
+    """Of some 400 000 seeds: by how many MiB the peak rises."""
+    code = """
+import resource
+import cv2
+import numpy as np
+from rangeedge import extractSeeds
+distance = np.random.default_rng(0).random((2000, 2000), np.float32)
+cv2.setNumThreads(128)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+count, _ = extractSeeds(distance, minDistance=0.01, separation=0.999)
+assert count > 400_000
+print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
+"""
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert float(run.stdout) < 120
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -13,9 +13,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstddef>
 #include <cstring>
 #include <limits>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -286,11 +288,17 @@ std::vector<Pass> Landscape::find_passes(const Array<float>& share) const {
     return all;
 }
 
+// What is the least so far becomes the least of that and a value.
+void lower(std::atomic<int>& least, int value) {
+    int known = least.load(std::memory_order_relaxed);
+    while (value < known && !least.compare_exchange_weak(known, value, std::memory_order_relaxed)) {
+    }
+}
+
 void Landscape::paint(const Array<Seed>& seeds, int count) {
-    constexpr int nowhere = std::numeric_limits<int>::max();
-    std::vector<Array<int>> first_pixels(static_cast<std::size_t>(team_.size()), Array<int>(count + 1, nowhere));
-    parallel_for(rows_, team_, [&](int first, int last, int thread) {
-        Array<int>& first_pixel = first_pixels[static_cast<std::size_t>(thread)];
+    std::vector<std::atomic<int>> first_pixel(static_cast<std::size_t>(count) + 1);
+    for (auto& p : first_pixel) p.store(std::numeric_limits<int>::max(), std::memory_order_relaxed);
+    parallel_for(rows_, team_, [&](int first, int last, int) {
         int before = 0;
         for (int p = index(first, 0); p < index(last, 0); ++p) {
             int own = 0;
@@ -299,17 +307,15 @@ void Landscape::paint(const Array<Seed>& seeds, int count) {
                 own = level(p) >= seed.least ? seed.number : 0;
             }
             markers_[p] = own;
-            if (own != before) first_pixel[own] = std::min(first_pixel[own], p);
+            if (own != before) lower(first_pixel[static_cast<std::size_t>(own)], p);
             before = own;
         }
     });
-    Array<int>& first_pixel = first_pixels.front();
-    std::vector<int> order;
-    for (int s = 1; s <= count; ++s) {
-        for (const Array<int>& of_thread : first_pixels) first_pixel[s] = std::min(first_pixel[s], of_thread[s]);
-        order.push_back(s);
-    }
-    std::sort(order.begin(), order.end(), [&](int a, int b) { return first_pixel[a] < first_pixel[b]; });
+    std::vector<int> order(static_cast<std::size_t>(count));
+    std::iota(order.begin(), order.end(), 1);
+    std::sort(order.begin(), order.end(), [&](int a, int b) {
+        return first_pixel[static_cast<std::size_t>(a)] < first_pixel[static_cast<std::size_t>(b)];
+    });
     Array<int> number(count + 1, 0);
     for (int n = 0; n < count; ++n) number[order[static_cast<std::size_t>(n)]] = n + 1;
     parallel_for(rows_, team_, [&](int first, int last, int) {
