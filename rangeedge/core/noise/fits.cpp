@@ -21,7 +21,8 @@ constexpr std::size_t depth_bins = 12;
 constexpr std::size_t least_in_bin = 40;  // steps
 constexpr double most_growth = 1.41;      // of a factor from n to 2 n, beyond what is measured
 constexpr double smooth_growth = 5.66;    // the same of waves without an end, 2^2.5: more than that is no noise
-// Of factors on slopes, at the most, where single values are noisy: waves of eight times their deviation.
+// Of factors on slopes, at the most, where single values are noisy and waves have no end, as shapes have none: waves of
+// eight times the deviation of single values.
 constexpr double most_slope[FitFactors::levels] = {6, 14, 24, 36, 45};
 const double most_shared = std::sqrt(5.0);  // over factors of one line: five lines that err alike
 constexpr double value_per_slope = 0.5;     // of factors, at the least: a wrong slope makes the value at the end wrong
@@ -106,10 +107,11 @@ void write_fit_noise(const DirectionSteps& found, Measure& measure, bool silent,
         measured[2][level] = together.slope, measured[3][level] = together.gap;
     }
     for (int kind = 0; kind < 4; ++kind) write_factors(measured[kind], numbers + kind * FitFactors::levels);
+    const bool waves_end = measured[0][wave_level + 1] <= most_growth * measured[0][wave_level];
     for (int level = 0; level < FitFactors::levels; ++level) {
         double *slope = numbers + level, *value = slope + FitFactors::levels;
         double *shared_slope = value + FitFactors::levels, *shared_value = shared_slope + FitFactors::levels;
-        if (!silent) *slope = std::min(*slope, most_slope[level]);
+        if (!silent && !waves_end) *slope = std::min(*slope, most_slope[level]);
         *value = std::min(std::max(*value, value_per_slope * *slope), *slope);
         *shared_slope = std::max(std::min(*shared_slope, most_shared * *slope), *slope);
         *shared_value =
