@@ -37,6 +37,7 @@ Every bad value raises `rangeedge.error`, which is a `cv2.error` and a `ValueErr
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -225,7 +226,8 @@ if not TYPE_CHECKING:
     def __getattr__(name: str) -> Any:
         if name in _SUBMODULES:
             return import_module(f".{name}", __name__)
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        message = f"module {__name__!r} has no attribute {name!r}"
+        raise AttributeError(message, name=name, obj=sys.modules[__name__])  # "did you mean", says Python then
 
 
 def __dir__() -> list[str]:

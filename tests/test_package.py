@@ -173,7 +173,9 @@ def stub():
 
 
 def test_stub_names_what_the_compiled_module_has(stub):
-    defined = {node.name for node in ast.parse(stub).body if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+    nodes = ast.parse(stub).body
+    defined = {node.name for node in nodes if isinstance(node, (ast.FunctionDef, ast.ClassDef))}
+    defined |= {node.target.id for node in nodes if isinstance(node, ast.AnnAssign)}
     assert defined == {name for name in dir(_core) if not name.startswith("_")}
 
 
