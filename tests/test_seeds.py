@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -157,8 +158,9 @@ def test_threads_do_not_matter():
 @pytest.mark.skipif(sys.platform != "linux", reason="the peak is in other units elsewhere, or unknown")
 def test_many_threads_share_their_memory():
     """Of some 400 000 seeds: by how many MiB the peak rises."""
-    code = """
-import resource
+    code = f"""
+import resource, sys
+sys.path.insert(0, {str(Path(rangeedge.__file__).parents[1])!r})
 import cv2
 import numpy as np
 from rangeedge import extractSeeds
