@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 _EVERYTHING: dict[str, Any] = {"minLength": 1, "lineSignificance": 0.0, "dynamic": False}
 _RAISED, _LOWERED = 1.001, 0.999  # past a limit, beyond the rounding of the maps
 _NAN = float("nan")
+_CORRELATED = 1.5  # a correlation from which it is worth a word
 _TESTS = ("gap", "single", "smooth", "smeared", "significance")  # in the order in which cuts get to them
 
 
@@ -59,12 +60,13 @@ class Explanation(NamedTuple):
     change: Mapping[str, Any]  # options that turn the answer, tried on this image; {} where none was found
     nearest: tuple[Neighbour, ...]  # of a pixel that is none: the nearest edge, and a candidate that is nearer
     depth: float
-    noise: float  # standard deviation of the depth there
+    noise: float  # standard deviation of the depth there, as neighbours differ
     jump: float
     crease: float
     kind: int
     significance: float
     lines: tuple[ScanLine, ...]
+    correlation: float = 1.0  # times as large is the noise of many pixels, on which tolerances depend
 
     def __repr__(self) -> str:
         return f"Explanation(x={self.x}, y={self.y}, edge={self.edge}, stage={self.stage!r}, change={self.change})"
@@ -203,6 +205,7 @@ class _Case:
             nearest=() if self.edge else tuple(self._nearest(reach)),
             depth=-depth if frame.heightMap else depth, noise=_noise_at(frame, x, y, depth), jump=self.jump,
             crease=self.crease, kind=self.kind, significance=self.significance, lines=lines,
+            correlation=frame.correlation,
         )  # fmt: skip
 
     def _verdict(self, lines: tuple[ScanLine, ...]) -> _Verdict:
@@ -374,9 +377,11 @@ def _rounded(value: float, towards: Any) -> float:
 def _said(why: Explanation) -> Iterator[str]:
     yield f"Pixel ({why.x}, {why.y}), {'an edge' if why.edge else 'no edge'}. {why.reason}"
     if np.isfinite(why.depth):
+        waves = f" ({why.correlation:.2g} times that over many pixels)" if why.correlation >= _CORRELATED else ""
         yield (
-            f"  depth {why.depth:.5g}, noise {why.noise:.2g}; jump {why.jump:.4g}, crease {why.crease:.3g} degrees,"
-            f" significance {why.significance:.3g}, {kindNames(why.kind)}"
+            f"  depth {why.depth:.5g}, noise {why.noise:.2g}{waves};"
+            f" jump {why.jump:.4g}, crease {why.crease:.3g} degrees, significance {why.significance:.3g},"
+            f" {kindNames(why.kind)}"
         )
     if why.change:
         options = ", ".join(f"{name}={value!r}" for name, value in why.change.items())

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge import detectEdges, drawExplanation, explainPixel
+from rangeedge import NoiseModel, detectEdges, drawExplanation, explainPixel
 from rangeedge.app.cli import main
 from rangeedge.draw.explanation import _ticks
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
@@ -248,3 +248,11 @@ def test_command_names_options_as_it_takes_them(tmp_path, capsys):
         assert not re.search(r"creaseThreshold|jumpThreshold|minLength|lineSignificance", said)
         assert main([*command, *options, *advice[1].split(", ")]) == 0
         assert (", no edge." in capsys.readouterr().out) == (advice[2] == "none")
+
+
+def test_noise_that_is_larger_over_many_pixels_is_said_to_be():
+    image, known = depths(1), {"K": K}
+    waves = explainPixel(image, 10, 10, noise=NoiseModel(0.002, correlation=4.2), **known)
+    assert waves.correlation == 4.2
+    assert "noise 0.002 (4.2 times that over many pixels);" in str(waves)
+    assert "noise 0.002;" in str(explainPixel(image, 10, 10, noise=0.002, **known))
