@@ -97,7 +97,8 @@ def array(name: str, value: Any, expected: str, ndim: Collection[int] = (2,)) ->
     if value.dtype.kind not in "buif":
         raise fail(name, expected, described(value), cv2.Error.StsUnsupportedFormat)
     if value.ndim > 1 and (value.shape[0] + 2) * (value.shape[1] + 2) >= PIXEL_LIMIT:
-        expected = f"{expected} of fewer than 2^29 pixels, a margin of one included (runBlocks takes larger images)"
+        limit = f"2^{PIXEL_LIMIT.bit_length() - 1}"
+        expected = f"{expected} of fewer than {limit} pixels, a margin of one included (runBlocks takes larger images)"
         raise fail(name, expected, described(value), cv2.Error.StsBadSize)
     return value
 

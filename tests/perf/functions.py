@@ -9,16 +9,14 @@ Each runs in a process of its own: its processor time, and by how much its memor
 from __future__ import annotations
 
 import argparse
-import re
 import subprocess
 import sys
-import time
 import warnings
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+from stages import spent
 
 import rangeedge as rr
 from rangeedge import evaluation
@@ -71,20 +69,12 @@ def calls(side: int) -> dict[str, Callable[[], Any]]:
     }
 
 
-def peak() -> int:
-    """The most memory that the process has had, in KiB."""
-    return int(re.search(r"VmHWM:\s*(\d+)", Path("/proc/self/status").read_text())[1])
-
-
 def measure(name: str, side: int) -> None:
     call = calls(side)[name]
     warnings.simplefilter("ignore")
-    Path("/proc/self/clear_refs").write_text("5")  # the peak is what is in use now
-    before, start = peak(), time.process_time()
-    call()
-    seconds, grown = time.process_time() - start, peak() - before
+    seconds, size = spent(call)
     pixels = side * side
-    print(f"{name:27} {seconds:8.2f} s {1e6 * seconds / pixels:8.2f} us {1024 * grown / pixels:8.0f} bytes", flush=True)
+    print(f"{name:27} {seconds:8.2f} s {1e6 * seconds / pixels:8.2f} us {size / pixels:8.0f} bytes", flush=True)
 
 
 def main() -> None:

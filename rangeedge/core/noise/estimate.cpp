@@ -59,7 +59,8 @@ NoiseEstimate estimate_noise(const T* ordinate, int rows, int cols, bool project
     const double middle = (found.lowest + found.highest) / 2, extent = found.highest - found.lowest;
     const bool silent = found.quiet <= finest * (projective ? std::abs(middle) : extent);
     estimate.fits = fit_noise(ordinate, rows, cols, projective, estimate.single, silent, team);
-    // Over many samples rounding errs as much as over few where it takes a while from one value to the next.
+    // Over many samples rounding errs as much as over few where it takes a while from one value to the next. Of heights
+    // the waves are as large as the deviation of single values, in which rounding is.
     if (projective) raise_to(estimate.fits.waves, found, [&](double) { return rounding; });
     return estimate;
 }
