@@ -51,7 +51,7 @@ public:
     }
 
     void peel() {
-        std::vector<int> border, candidates, gone, next;
+        std::vector<int> border, next;
         std::size_t enclosed = 0;  // pixels that have not been border yet
         for_each_set([&](int p) {
             if (is_border(p))
@@ -67,23 +67,26 @@ public:
                 const bool goes = kinds[ring<on>(p)].may_go() && !(state_[at(p)] & stays);
                 state_[at(p)] |= goes ? candidate : line;
             }
-            candidates.clear();
-            append_if(border, candidates, [&](int p) { return (state_[at(p)] & candidate) != 0; });
             next.clear();
-            append_if(candidates, next, [&](int p) { return is_crucial(ring<on>(p), ring<candidate>(p)); });
+            for (const int p : border)
+                if (state_[at(p)] & candidate && is_crucial(ring<on>(p), ring<candidate>(p))) next.push_back(p);
             for (const int p : next) state_[at(p)] = on | line;
-            append_if(border, lines_, [&](int p) { return (state_[at(p)] & line) != 0; });
-            gone.clear();
-            append_if(candidates, gone, [&](int p) { return !(state_[at(p)] & line); });
-            for (const int p : gone) state_[at(p)] = 0;
             next.clear();
-            for (const int p : gone)
+            for (const int p : border) {
+                if (state_[at(p)] & line)
+                    lines_.push_back(p);
+                else
+                    state_[at(p)] = 0;
+            }
+            for (const int p : border) {
+                if (is_set(p)) continue;
                 for (const int from : {east, north, west, south}) {
                     const int q = p + offsets_[at(from)];
                     if ((state_[at(q)] & (on | line | queued)) != on) continue;
                     state_[at(q)] |= queued;
                     next.push_back(q);
                 }
+            }
             enclosed -= next.size();
             border.swap(next);
         }
@@ -139,18 +142,6 @@ private:
     }
     int count_neighbours(int p) const { return kinds[ring<on>(p)].neighbours; }
 
-    // Appends those pixels that are wanted; no branch says which, as none could be predicted.
-    template <class F>
-    static void append_if(const std::vector<int>& pixels, std::vector<int>& to, F&& wanted) {
-        std::size_t count = to.size();
-        to.resize(count + pixels.size());
-        for (const int p : pixels) {
-            to[count] = p;
-            count += static_cast<std::size_t>(wanted(p));
-        }
-        to.resize(count);
-    }
-
     template <class F>
     void for_each_set(F&& f) const {
         const int end = static_cast<int>(state_.size());
@@ -198,9 +189,8 @@ private:
             group.swap(by_depth_[least]);
             for (const int from : {south, north, east, west}) {
                 side.clear();
-                append_if(group, side, [&](int p) {
-                    return int{!is_set(p + offsets_[at(from)])} & int{from_here(ring<on>(p), from)};
-                });
+                for (const int p : group)
+                    if (!is_set(p + offsets_[at(from)]) && from_here(ring<on>(p), from)) side.push_back(p);
                 for (const int p : side) {
                     checkpoints_.pass();
                     if (!is_set(p) || !kinds[ring<on>(p)].may_go()) continue;
