@@ -166,12 +166,10 @@ def read_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None 
     if mask is not None:
         inside = image8("mask", mask, src.shape[:2]) != 0
         seen = inside if seen is None else seen & inside
-    _core.checkpoint()
     if params.invalid is not None:
         found = _holds(src, params.invalid)
         if found.any():
             seen = ~found if seen is None else seen & ~found
-    _core.checkpoint()
     if src.ndim == 3:
         return _points(src, seen, params)
     if params.K is not None:
@@ -262,9 +260,7 @@ def _pinhole(src: np.ndarray, seen: np.ndarray | None, params: ScanLineParams) -
 def _grid(src: np.ndarray, seen: np.ndarray | None, params: ScanLineParams) -> Frame:
     heightMap, pixelSize = params.heightMap, params.pixelSize
     values = _lengths(src, params.depthFactor, heightMap)
-    _core.checkpoint()
     height = values if heightMap else -values
-    _core.checkpoint()
     infinite = np.isinf(height)
     if infinite.any():
         height = np.where(infinite, height.dtype.type(np.nan), height)

@@ -306,7 +306,6 @@ def select_maps(
         return edges
 
     edges = reaching(*thresholds)
-    _core.checkpoint()
     if hysteresis < 1:
         edges = _connected_to(edges, reaching(*low), wrap)
     least = LINE_SIGNIFICANCE if selection.lineSignificance is None else selection.lineSignificance
