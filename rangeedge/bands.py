@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from . import _core
 
 _SIZE = 1 << 20  # values of a part, which take some milliseconds
+_SPARSE = 4  # places in a table for one value, beyond which there is none
 
 
 def bands(values: np.ndarray) -> Iterator[slice]:
@@ -29,8 +30,7 @@ def by_bands(function: Callable[..., np.ndarray], *maps: np.ndarray | None, halo
         if whole is None:
             whole = np.empty((height, *own.shape[1:]), own.dtype)
         whole[rows] = own
-    assert whole is not None
-    return whole
+    return function(*maps) if whole is None else whole
 
 
 def chosen(values: np.ndarray, where: np.ndarray) -> Iterator[np.ndarray]:
@@ -38,12 +38,37 @@ def chosen(values: np.ndarray, where: np.ndarray) -> Iterator[np.ndarray]:
     return (values[rows][where[rows]] for rows in bands(values))
 
 
-def occurring(labels: Sequence[np.ndarray], end: int) -> np.ndarray:
-    """Which of the labels from 0 to `end` - 1 occur in arrays."""
-    found = np.zeros(end, bool)
-    for some in labels:
-        found[some] = True
-    return found
+def distinct(values: np.ndarray) -> np.ndarray:
+    """The different integers of an array, ascending."""
+    if not values.size:
+        return np.zeros(0, values.dtype)
+    low, high = int(values.min()), int(values.max())
+    if high - low > _SPARSE * values.size:
+        return np.unique(np.concatenate([np.unique(values[rows]) for rows in bands(values)]))
+    found = np.zeros(high - low + 1, bool)
+    for rows in bands(values):
+        found[values[rows] - low] = True
+    return (np.flatnonzero(found) + low).astype(values.dtype)
+
+
+def numbered(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The different integers of an array, ascending, and which of these each is."""
+    names = distinct(values)
+    low, span = (int(names[0]), int(names[-1]) - int(names[0]) + 1) if len(names) else (0, 0)
+    if span > _SPARSE * values.size:
+        return names, by_bands(lambda own: np.searchsorted(names, own), values)
+    rank = np.zeros(span, np.intp)
+    rank[names - low] = np.arange(len(names))
+    return names, by_bands(lambda own: rank[own - low], values)
+
+
+def counts(numbers: np.ndarray, end: int) -> np.ndarray:
+    """How often each of the numbers from 0 to `end` - 1 occurs."""
+    total = np.zeros(end, np.intp)
+    for rows in bands(numbers):
+        own = np.bincount(numbers[rows].ravel())
+        total[: len(own)] += own
+    return total
 
 
 def quantiles(values: np.ndarray, *shares: float) -> list[float]:
@@ -57,4 +82,4 @@ def quantiles(values: np.ndarray, *shares: float) -> list[float]:
     if not count:
         return [np.nan] * len(shares)
     places = np.array(shares) * (count - 1)
-    return [np.quantile(pair, place).item() for pair, place in zip(found, places - np.floor(places), strict=True)]
+    return [np.quantile(pair.astype(float), place) for pair, place in zip(found, places % 1, strict=True)]

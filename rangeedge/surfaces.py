@@ -9,7 +9,7 @@ import cv2
 import numpy as np
 
 from . import _core
-from .bands import bands, by_bands, quantiles
+from .bands import bands, by_bands, counts, quantiles
 from .frame import Frame
 
 SURFACE = np.dtype([("curved", np.bool_), ("centroid", "3f8"), ("normal", "3f8"), ("quadric", "10f8"), ("rms", "f8")])
@@ -163,9 +163,7 @@ def without_rims(labels: np.ndarray) -> np.ndarray:
 
     inner = by_bands(inside, labels, halo=_RIM)
     count = int(labels.max()) + 1
-    before, after = (
-        sum(np.bincount(of[rows].ravel(), minlength=count) for rows in bands(of)) for of in (labels, inner)
-    )
+    before, after = counts(labels, count), counts(inner, count)
     whole = after < np.maximum(_LEAST_CURVED, _LEAST_INNER * before)
     return by_bands(lambda all_of, own: np.where(whole[all_of], all_of, own).astype(labels.dtype), labels, inner)
 

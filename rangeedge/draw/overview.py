@@ -16,7 +16,7 @@ from ..selection import strengthImage
 from .distance import checked_distance, distance_colours
 from .palette import EDGE_KINDS, LINE_KINDS, colour_index, paint
 from .regions import drawRegions
-from .relief import hatch, relief_of, subdued
+from .relief import hatched, relief_of, subdued
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -245,7 +245,7 @@ def _distance_panel(distance: np.ndarray, valid: np.ndarray) -> tuple[str, np.nd
     longest = float(finite.max(initial=0))
     colours = distance_colours(distance, longest or None, False)
     caption = f"Distance to the edges, up to {longest:.3g}" if finite.size else "Distance: no edges"
-    return caption, np.where(valid[..., np.newaxis], colours, hatch(valid.shape))
+    return caption, hatched(colours, valid)
 
 
 def _sheet(
