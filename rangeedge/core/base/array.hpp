@@ -39,7 +39,7 @@ public:
 
 private:
     static std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-    std::vector<T, LargeAllocator<T>> values_;
+    LargeVector<T> values_;
 };
 
 }  // namespace rangeedge

@@ -6,6 +6,9 @@
 #include <cstdint>
 #include <new>
 #include <utility>
+#include <vector>
+
+#include "base/watch.hpp"
 
 #if defined(__linux__)
 #include <sys/mman.h>
@@ -14,7 +17,8 @@
 namespace rangeedge {
 
 // Asks for large pages where there is much: what is near in an image is far apart in memory, and looking up one of many
-// small pages takes as long as what is then done with a pixel. Elements without a value are not set.
+// small pages takes as long as what is then done with a pixel. Elements without a value are not set. A checkpoint where
+// there is much, as filling it takes long.
 template <class T>
 struct LargeAllocator {
     using value_type = T;
@@ -25,6 +29,7 @@ struct LargeAllocator {
 
     T* allocate(std::size_t n) {
         if (!is_large(n)) return static_cast<T*>(::operator new(n * sizeof(T)));
+        Watch::checkpoint();
         void* const p = ::operator new(n * sizeof(T), std::align_val_t{page});
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
         madvise(p, n * sizeof(T) / page * page, MADV_HUGEPAGE);
@@ -60,5 +65,8 @@ private:
 
     static bool is_large(std::size_t n) { return n > least / sizeof(T); }
 };
+
+template <class T>
+using LargeVector = std::vector<T, LargeAllocator<T>>;
 
 }  // namespace rangeedge
