@@ -19,6 +19,7 @@ import pytest
 import rangeedge
 from rangeedge import _check, evaluation
 from rangeedge.batch import runBatch
+from rangeedge.cancellation import apart
 
 SOON = 0.2  # seconds
 TRIES = 3  # of which the quickest counts, as other programs may run
@@ -331,6 +332,27 @@ def test_calls_are_given_up_while_others_come_and_go():
     assert min(ends.values()) > 10
 
 
+def test_a_step_of_another_library_is_left_to_its_thread():
+    started, go_on, ended, cancellation = (*(threading.Event() for _ in range(3)), rangeedge.Cancellation())
+
+    def step():
+        started.set()
+        go_on.wait(10)
+        ended.set()
+
+    call = _check.named("call")(lambda: apart(1 << 30, step))
+    threading.Thread(target=lambda: (started.wait(10), cancellation.cancel())).start()
+    with cancellation, pytest.raises(CancelledError):
+        call()
+    assert not ended.is_set()
+    go_on.set()
+    assert ended.wait(10)
+    for pixels in (1, 1 << 30):
+        assert apart(pixels, divmod, 7, 2) == (3, 1)
+        with pytest.raises(ZeroDivisionError):
+            apart(pixels, divmod, 7, 0)
+
+
 @pytest.mark.parametrize("wait", [0.02, 0.1])
 def test_python_may_end_while_kernels_work(wait):
     program = f"""
@@ -384,3 +406,38 @@ for _ in range(20):
     assert os.waitpid(child, 0)[1] == 0
 """
     subprocess.run([sys.executable, "-W", "ignore", "-c", program], check=True, timeout=60)
+
+
+def test_a_program_without_a_main_guard_is_told(tmp_path):
+    path = tmp_path / "program.py"
+    path.write_text(f"""
+import sys; sys.path.insert(0, {str(ROOT)!r})
+import numpy as np, rangeedge
+print("start", flush=True)
+list(rangeedge.mapFrames([np.ones((8, 8))] * 20, rangeedge.detectEdges, jobs=2))
+""")
+    run = subprocess.run([sys.executable, path], capture_output=True, text=True, check=False, timeout=60)
+    assert run.returncode == 1
+    assert 'if __name__ == "__main__":' in run.stderr.splitlines()[-1]
+    assert run.stdout.count("start") <= 3  # this program, and a worker each
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there are no such signals")
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_interrupted_batch_ends_and_leaves_nothing(tmp_path, jobs):
+    for k in range(4):
+        np.save(tmp_path / f"{k}.npy", noise(1200))
+    command = [sys.executable, "-m", "rangeedge", "batch", str(tmp_path), "--out", str(tmp_path / "out")]
+    command += ["--pixel-size", "1", "--noise", "1e-4", "--jobs", str(jobs)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as run:
+        manifest = tmp_path / "out" / "manifest.jsonl"
+        while not manifest.exists() and run.poll() is None:
+            time.sleep(0.05)
+        time.sleep(0.7)
+        run.send_signal(signal.SIGINT)
+        began = time.monotonic()
+        said = run.communicate()[1]
+        assert run.returncode == 130, said
+        assert time.monotonic() - began < 25 * SOON  # the end of Python takes a while, too
+    assert not list(tmp_path.rglob("*.tmp"))

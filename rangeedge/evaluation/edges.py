@@ -10,6 +10,7 @@ import numpy as np
 
 from .. import _check
 from ..bands import by_bands, distinct
+from ..cancellation import apart
 from ..constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
 from ..distance import distanceTransformWithLabels
 from .counts import Counts, ratio
@@ -375,7 +376,7 @@ def _skeleton(edges: np.ndarray) -> np.ndarray:
     # Not by our own thinning: a score must not depend on what it scores.
     from skimage.morphology import skeletonize
 
-    return skeletonize(edges)
+    return apart(edges.size, skeletonize, edges)
 
 
 def _nearest(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <new>
@@ -17,8 +18,7 @@
 namespace rangeedge {
 
 // Asks for large pages where there is much: what is near in an image is far apart in memory, and looking up one of many
-// small pages takes as long as what is then done with a pixel. Elements without a value are not set. A checkpoint where
-// there is much, as filling it takes long.
+// small pages takes as long as what is then done with a pixel. Elements without a value are not set.
 template <class T>
 struct LargeAllocator {
     using value_type = T;
@@ -29,7 +29,6 @@ struct LargeAllocator {
 
     T* allocate(std::size_t n) {
         if (!is_large(n)) return static_cast<T*>(::operator new(n * sizeof(T)));
-        Watch::checkpoint();
         void* const p = ::operator new(n * sizeof(T), std::align_val_t{page});
 #if defined(__linux__) && defined(MADV_HUGEPAGE)
         madvise(p, n * sizeof(T) / page * page, MADV_HUGEPAGE);
@@ -68,5 +67,17 @@ private:
 
 template <class T>
 using LargeVector = std::vector<T, LargeAllocator<T>>;
+
+// As resize(size, value), with checkpoints: memory that is touched for the first time comes slowly.
+template <class T>
+void fill_up(LargeVector<T>& values, std::size_t size, const T& value) {
+    constexpr std::size_t block = (std::size_t{1} << 22) / sizeof(T) + 1;
+    if (size > values.capacity()) values.reserve(std::max(size, 2 * values.capacity()));
+    while (values.size() + block < size) {
+        values.resize(values.size() + block, value);
+        Watch::checkpoint();
+    }
+    values.resize(size, value);
+}
 
 }  // namespace rangeedge

@@ -119,11 +119,17 @@ std::int32_t nearest_in_sight(const Terrain& terrain, const LargeVector<std::int
 class Shadows {
 public:
     Shadows(const Terrain& terrain, const Grid& grid, LargeVector<std::int32_t>& labels)
-        : terrain_(terrain), grid_(grid), labels_(labels), corner_(labels), before_(labels.size(), 0.0),
-          length_(labels.size(), std::numeric_limits<double>::infinity()) {}
+        : terrain_(terrain), grid_(grid), labels_(labels), corner_(labels.size()), before_(labels.size()),
+          length_(labels.size()) {}
 
-    // To be called for every pixel whose label is in sight, before `settle`.
-    void start_at(std::int32_t p) { length_[at(p)] = terrain_.length(terrain_.offset(p, labels_[at(p)])); }
+    // To be called for every pixel before `settle`; -1 is the label of those that see no source.
+    void start_at(std::int32_t p) {
+        const std::int32_t source = labels_[at(p)];
+        corner_[at(p)] = source;
+        before_[at(p)] = 0;
+        length_[at(p)] =
+            source < 0 ? std::numeric_limits<double>::infinity() : terrain_.length(terrain_.offset(p, source));
+    }
 
     void settle() {
         Checkpoints checkpoints(256);
@@ -217,16 +223,16 @@ void geodesic_transform(const std::uint8_t* edges, const std::uint8_t* barrier, 
     distance_transform(sources.data(), grid, distance, nearest.data(), threads);
 
     const Terrain terrain(walls.data(), grid, threads);
-    LargeVector<std::int32_t> seen(at(count), -1);
+    LargeVector<std::int32_t> seen(at(count));
     parallel_each(grid.rows, team, [&](int row, int) {
-        for (int col = 0; col < grid.cols; ++col)
-            if (!walls[grid.index(row, col)]) seen[grid.index(row, col)] = nearest_in_sight(terrain, nearest, row, col);
+        for (int col = 0; col < grid.cols; ++col) {
+            const std::size_t p = grid.index(row, col);
+            seen[p] = walls[p] ? -1 : nearest_in_sight(terrain, nearest, row, col);
+        }
     });
     for_pixels([&](std::int32_t p) { nearest[at(p)] = seen[at(p)]; });
     Shadows shadows(terrain, grid, nearest);
-    for_pixels([&](std::int32_t p) {
-        if (seen[at(p)] >= 0) shadows.start_at(p);
-    });
+    for_pixels([&](std::int32_t p) { shadows.start_at(p); });
     shadows.settle();
     for_pixels([&](std::int32_t p) {
         if (seen[at(p)] < 0) distance[p] = static_cast<float>(shadows.length(p));
