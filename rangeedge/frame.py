@@ -97,7 +97,7 @@ class Frame:
         """Distance along the viewing axis, NaN where invalid."""
         return 1 / self.ordinate if self.projective else -self.ordinate
 
-    @property
+    @cached_property
     def points(self) -> np.ndarray:
         """(H, W, 3) coordinates of every pixel, NaN where invalid."""
         if self.samples.ndim == 3:

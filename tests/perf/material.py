@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import functions
 import numpy as np
+import worst
 from frames import lidar, room, terrain
 
 import rangeedge as rr
@@ -24,12 +24,9 @@ GROUPS = ("depth", "forms", "maps", "lines", "regions", "pictures", "scores", "s
 def calls(group: str, side: int) -> dict[str, Callable[[], Call]]:
     """What prepares each call of a group on images of side x side pixels."""
     if group == "worst":
-        return {name: partial(_itself, call) for name, call in functions.calls(side).items()}
+        images = worst.Images(side, side)
+        return {f"{name}, {of}": make for name, cases in worst.functions().items() for of, make in cases(images)}
     return getattr(Ordinary(side), group)()
-
-
-def _itself(call: Call) -> Call:
-    return call
 
 
 class Ordinary:
