@@ -90,12 +90,12 @@ class Frame:
     @cached_property
     def valid(self) -> np.ndarray:
         """uint8, 1 where a pixel has data."""
-        return np.isfinite(self.ordinate).view(np.uint8)
+        return by_bands(np.isfinite, self.ordinate).view(np.uint8)
 
     @cached_property
     def depth(self) -> np.ndarray:
         """Distance along the viewing axis, NaN where invalid."""
-        return 1 / self.ordinate if self.projective else -self.ordinate
+        return by_bands(lambda own: 1 / own if self.projective else -own, self.ordinate)
 
     @cached_property
     def points(self) -> np.ndarray:

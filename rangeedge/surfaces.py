@@ -85,8 +85,9 @@ def places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[fl
 def _spacing(xy: np.ndarray) -> float:
     """The median step between neighbours in rows and columns of (H, 2, W) places, 1 where there is none."""
     height, _, width = xy.shape
-    steps = np.full((2, height, width), np.nan)  # no number where there is none or it is 0
+    steps = np.empty((2, height, width))  # no number where there is none or it is 0
     for rows in bands(steps[0]):
+        steps[:, rows] = np.nan
         for axis, own in ((0, xy[rows.start : rows.stop + 1]), (2, xy[rows])):
             step = np.hypot(*np.moveaxis(np.diff(own, axis=axis), 1, 0))
             into = steps[axis // 2, rows.start : rows.start + step.shape[0], : step.shape[1]]
@@ -122,7 +123,7 @@ def surfaces_of(frame: Frame, labels: np.ndarray, count: int) -> np.ndarray:
     points = frame.points
     origins, scales = np.zeros((count, 3)), np.ones(count)
     moments, curved = np.zeros((count, len(_EXPONENTS))), np.zeros(count, np.uint8)
-    ordinate = frame.ordinate.astype(np.float64, copy=False)
+    ordinate = by_bands(lambda own: own.astype(np.float64), frame.ordinate)
     _core.region_moments(labels, points, ordinate, frame.threads, origins, scales, moments, curved)
     # Planes and quadrics in (p - origin) / scale, as coefficients of _TERMS and 1, with a gradient of about 1.
     mean, normal, rms = _planes(moments)
