@@ -10,6 +10,7 @@ import numpy as np
 from .. import _check
 from .._option import parsed
 from ..bands import by_bands, chosen, quantiles
+from ..cancellation import apart
 from ..frame import read_frame
 from ..options import ScanLineParams
 
@@ -67,9 +68,9 @@ def _filled(depth: np.ndarray, valid: np.ndarray) -> np.ndarray:
 
 def nearest(inside: np.ndarray) -> np.ndarray:
     """For every pixel, which of the pixels inside, counted row by row, is nearest."""
-    _, labels = cv2.distanceTransformWithLabels(
-        (~inside).view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_5, labelType=cv2.DIST_LABEL_PIXEL
-    )
+    outside = (~inside).view(np.uint8)
+    kind = {"distanceType": cv2.DIST_L2, "maskSize": cv2.DIST_MASK_5, "labelType": cv2.DIST_LABEL_PIXEL}
+    _, labels = apart(inside.size, cv2.distanceTransformWithLabels, outside, **kind)
     rank = np.zeros(labels.max() + 1, np.intp)
     count = 0
     for own in chosen(labels, inside):
