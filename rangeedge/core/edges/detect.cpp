@@ -91,7 +91,8 @@ private:
         if (trace_)
             trace_->back().smeared = 1, trace_->back().cut = trace_->back().sample = (step.low + step.high) / 2.0;
         for (int k = step.before + 1; k < step.after; ++k)
-            if (line.ordinate(k) == line.ordinate(k)) smeared.push_back(static_cast<std::int32_t>(line.pixel(k)));
+            if (line.ordinate(k) == line.ordinate(k) && line.has_data(k))
+                smeared.push_back(static_cast<std::int32_t>(line.pixel(k)));
         return step.next;
     }
 
@@ -200,8 +201,8 @@ private:
         c.y = static_cast<float>(line.path.row + edge.sample * line.path.drow);
         c.shift = static_cast<float>(edge.shift);
         c.direction = static_cast<std::uint8_t>(direction_);
-        c.before = static_cast<std::int32_t>(line.pixel(edge.before));
-        c.after = static_cast<std::int32_t>(line.pixel(edge.after));
+        c.before = static_cast<std::int32_t>(line.pixel_with_data(edge.before, -1));
+        c.after = static_cast<std::int32_t>(line.pixel_with_data(edge.after, 1));
         const double w = line.start + line.step * edge.abscissa, *d = line.direction;
         if (line.curved) {
             const PlaneImage image(line.rays, w);
@@ -318,7 +319,8 @@ LineTrace trace_line(const Frame<T>& frame, const ScanLineOptions& options, int 
     detector.detect(strip, approximator, found);
     const Line<T>& line = strip.lines.front();
     for (int k = 0; k < line.path.size; ++k) {
-        const double x = line.abscissa(k), y = line.ordinate(k), tolerance = line.tolerance_at(k);
+        const double x = line.abscissa(k), tolerance = line.tolerance_at(k);
+        const double y = line.has_data(k) ? line.ordinate(k) : NAN;
         const double z = line.depth(y, x), off = std::abs(line.depth(y + tolerance, x) - z);
         trace.samples.push_back({double(line.path.col + k * line.path.dcol), double(line.path.row + k * line.path.drow),
                                  x, y, z, NAN, NAN, tolerance, off});
