@@ -18,7 +18,7 @@ from .edges import EdgeStrength, measure_points, measure_strength
 from .frame import Frame
 from .noise import measured_frame
 from .options import DETECTION, SELECTION, ScanLineParams, Selection
-from .plausible import warn_of_angle, warn_of_thresholds
+from .plausible import warn_of_selection
 from .sectors import around
 from .selection import select_strength
 from .thinning import thinEdges
@@ -154,8 +154,7 @@ def detectEdgesWithStrength(
 
 def run_detector(frame: Frame, params: ScanLineParams, selection: Selection) -> tuple[np.ndarray, EdgeStrength]:
     """The edges of a checked range image: strengths, those of them that count, and their middle lines."""
-    warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
-    warn_of_angle(selection.creaseThreshold)
+    warn_of_selection(frame, selection)
     strength = measure_strength(frame, params)
     return thin_lines(frame, selected(frame, strength, selection.of(params))), strength
 

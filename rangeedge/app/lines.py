@@ -18,7 +18,7 @@ from ..io import RangeImage
 from ..io.lines import encoded_lines
 from ..noise import measured_frame
 from ..options import LINKING, Linking, ScanLineParams, Selection
-from ..plausible import warn_of_thresholds
+from ..plausible import warn_of_selection
 from ..segments import Segments, fitSegments
 from .results import encoded, on_map, plain
 from .understood import understood
@@ -59,7 +59,7 @@ def find_lines(
     """The chains of an image, their segments, and what is known of the image."""
     params, selection, linking = parsed(options, ScanLineParams, Selection, Linking)
     frame = measured_frame(src, params, mask)
-    warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
+    warn_of_selection(frame, selection)
     chains = link_frame(frame, params, selection, linking)
     segments, vertices = fitSegments(chains, tolerance)
     return LineResults(frame, chains, segments, vertices, understood(frame, params, selection, src))

@@ -32,7 +32,7 @@ from ..io.atomic import nameless, put
 from ..io.lines import encoded_lines
 from ..noise import measured_frame
 from ..options import DETECTION, Growing, ScanLineParams, Selection
-from ..plausible import warn_of_thresholds
+from ..plausible import warn_of_selection
 from ..regions import described_regions, seeded_regions
 from ..sectors import around
 from .understood import understood
@@ -94,7 +94,7 @@ def find_edges(src: np.ndarray, *, mask: np.ndarray | None = None, **options: An
 
 def _edges_of(src: np.ndarray, mask: np.ndarray | None, params: ScanLineParams, selection: Selection) -> EdgeResults:
     frame = measured_frame(src, params, mask)
-    warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
+    warn_of_selection(frame, selection)
     strength, points = measure_both(frame, params)
     edges = selected(frame, strength, selection.of(params))
     thin = thin_lines(frame, edges)

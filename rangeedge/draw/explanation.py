@@ -6,7 +6,8 @@ import cv2
 import numpy as np
 
 from .. import _check
-from ..explain import Cut, Explanation, ScanLine
+from ..explain import Explanation
+from ..traces import Cut, ScanLine
 from .palette import kind_colour
 
 _WIDTH, _HEIGHT, _LEFT, _RIGHT, _TOP, _BOTTOM = 620, 300, 74, 12, 34, 30
