@@ -11,7 +11,7 @@ import numpy as np
 from ._check import fail, integer
 from ._option import parsed, takes
 from .constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, EDGE_OCCLUDING
-from .edges import kindNames, measure_strength
+from .edges import kind_in_words, measure_strength
 from .frame import Frame
 from .least_change import least_change
 from .noise import measured_frame
@@ -65,6 +65,11 @@ class Explanation(NamedTuple):
     others: int = 0  # edge pixels that come or go with the change, beside this one
     obstacle: str = ""  # where no change was found: what stands in the way after the test that decided
     unit: str = ""  # of lengths; "" where only the user knows
+
+    @property
+    def correlated(self) -> bool:
+        """Whether the noise of neighbours is alike, so that it is worth a word."""
+        return self.correlation >= _CORRELATED
 
     def __repr__(self) -> str:
         return f"Explanation(x={self.x}, y={self.y}, edge={self.edge}, stage={self.stage!r}, change={self.change})"
@@ -215,13 +220,14 @@ def _noise_at(frame: Frame, x: int, y: int, depth: float) -> float:
 
 
 def _said(why: Explanation) -> Iterator[str]:
+    unit = f" {why.unit}" if why.unit else ""
+    waves = f" (correlated: {why.correlation:.2g} times that over many pixels)" if why.correlated else ""
     yield f"Pixel ({why.x}, {why.y}), {'an edge' if why.edge else 'no edge'}. {why.reason}"
     if np.isfinite(why.depth):
-        waves = f" ({why.correlation:.2g} times that over many pixels)" if why.correlation >= _CORRELATED else ""
         yield (
-            f"  depth {why.depth:.5g}, noise {why.noise:.2g}{waves};"
-            f" jump {why.jump:.4g}, crease {why.crease:.3g} degrees, significance {why.significance:.3g},"
-            f" {kindNames(why.kind)}"
+            f"  depth {why.depth:.5g}{unit}, noise {why.noise:.2g}{unit}{waves};"
+            f" jump {why.jump:.4g}{unit}, crease {why.crease:.3g} degrees, significance {why.significance:.3g};"
+            f" {kind_in_words(why.kind)}"
         )
     if why.change:
         options = ", ".join(f"{name}={value!r}" for name, value in why.change.items())
@@ -230,18 +236,19 @@ def _said(why: Explanation) -> Iterator[str]:
     elif why.obstacle:
         yield f"  No change of options was found that makes it {'none' if why.edge else 'one'}. Next: {why.obstacle}"
     for found in why.nearest:
-        yield f"  {_beside(found)}"
+        yield f"  {_beside(found, unit)}"
     for line in why.lines:
         segment = line.segments[(line.segments["first"] <= line.at) & (line.segments["last"] >= line.at)]
         size = f"in a segment of {int(segment['last'][0] - segment['first'][0]) + 1} pixels" if len(segment) else ""
         curve = f", {'curved' if segment['a'][0] else 'straight'}" if len(segment) else ""
-        yield f"{line.name}: {size}{curve}, tolerance {line.samples['toleranceDepth'][line.at]:.2g}"
+        yield f"{line.name}: {size}{curve}, tolerance {line.samples['toleranceDepth'][line.at]:.2g}{unit}"
         for cut in sorted(line.cuts, key=lambda c: abs(c.sample - line.at))[:3]:
-            yield f"  cut {cut.sample - line.at:+.1f} px, at ({cut.x:.1f}, {cut.y:.1f}), {cut.kind}: {cut.fate}"
+            kind = kind_in_words(cut.bits)
+            yield f"  cut {cut.sample - line.at:+.1f} px, at ({cut.x:.1f}, {cut.y:.1f}), {kind}: {cut.fate}"
 
 
-def _beside(found: Neighbour) -> str:
-    size = f"a jump of {found.jump:.4g}" if found.kind & EDGE_JUMP else f"a crease of {found.crease:.3g} degrees"
+def _beside(found: Neighbour, unit: str) -> str:
+    size = f"a jump of {found.jump:.4g}{unit}" if found.kind & EDGE_JUMP else f"a crease of {found.crease:.3g} degrees"
     what = "edge" if found.edge else "candidate, itself no edge,"
     away = f"{found.distance:.3g} {'pixel' if found.distance == 1 else 'pixels'} away"
-    return f"The nearest {what} is ({found.x}, {found.y}), {away}: {size}, {kindNames(found.kind)}."
+    return f"The nearest {what} is ({found.x}, {found.y}), {away}: {size} ({kind_in_words(found.kind)})."

@@ -500,7 +500,7 @@ def test_lines_writes_chains_and_segments(image, tmp_path, capsys):
     assert report["chains"] == len(chains) >= 4
     assert report["segments"] == len(fitSegments(chains).segments) == 4
     assert f"{report['chains']} chains, 4 segments" in said
-    assert report["understood"]["unit"] == "stored values / 1000"
+    assert report["understood"]["unit"] == "m (stored in mm)"
     assert report["understood"]["medianDepth"] == pytest.approx(1.5, abs=0.01)
     assert report["noise"]["a"] == pytest.approx(estimateNoise(imreadRange(image).src, K=K).a)
     assert len((out / "chains.csv").read_text().splitlines()) == 1 + len(chains.points)

@@ -210,7 +210,7 @@ def test_names_the_nearest_edge_and_a_nearer_candidate():
     assert candidate.edge is False
     assert abs(candidate.x - 39.5) <= 0.5
     assert candidate.crease == pytest.approx(np.degrees(np.arctan(0.1)), abs=0.01)
-    assert "The nearest edge is (19, 20), 16 pixels away: a jump of 0.5, jump occluding." in str(why)
+    assert "The nearest edge is (19, 20), 16 pixels away: a jump of 0.5 (jump, nearer side)." in str(why)
     assert "The nearest candidate, itself no edge, is (" in str(why)
     assert explainPixel(np.ones((40, 80)), 35, 20, noise=0.001).nearest == ()
 
@@ -338,5 +338,5 @@ def test_noise_that_is_larger_over_many_pixels_is_said_to_be():
     image, known = depths(1), {"K": K}
     waves = explainPixel(image, 10, 10, noise=NoiseModel(0.002, correlation=4.2), **known)
     assert waves.correlation == 4.2
-    assert "noise 0.002 (4.2 times that over many pixels);" in str(waves)
-    assert "noise 0.002;" in str(explainPixel(image, 10, 10, noise=0.002, **known))
+    assert "noise 0.002 m (correlated: 4.2 times that over many pixels);" in str(waves)
+    assert "noise 0.002 m;" in str(explainPixel(image, 10, 10, noise=0.002, **known))

@@ -30,8 +30,9 @@ def drawEdges(
 
     drawEdges(src, edges[, kind[, dst]], *[, K[, ...]]) -> dst
 
-    With `kind`: jump vermilion on the near side and purple on the far side, convex yellow, concave blue, beside no data
-    grey, anything else white; a jump hides a crease. Without it every edge is white. Pixels without data are hatched.
+    With `kind`: jump vermilion on the nearer side and purple on the farther side, convex yellow, concave blue, beside
+    no data grey, anything else white; a jump hides a crease. Without it every edge is white. Pixels without data are
+    hatched.
 
     Parameters
     ----------
