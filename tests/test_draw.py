@@ -406,8 +406,8 @@ class TestNumbers:
         canvas = np.zeros((400, 400, 3), np.uint8)
         assert write_lengths(canvas, segments[:1], np.zeros(0, VERTEX), 4) == 1
         assert write_lengths(canvas, segments, np.zeros(0, VERTEX), 4) == 2  # the last one is shorter than its number
-        blocked = np.zeros(20, VERTEX)
-        blocked["x"], blocked["y"] = np.repeat(np.linspace(10, 90, 10), 2), np.tile([46, 50], 10)
+        blocked = np.zeros(80, VERTEX)
+        blocked["x"], blocked["y"] = np.repeat(np.linspace(10, 90, 40), 2), np.tile([46, 50], 40)
         assert write_lengths(canvas, segments[:1], blocked, 4) == 0
 
 
