@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .detector import selected, thin_lines
+from .detection import selected, thin_lines
 from .edges import EdgeStrength, measure_strength
 from .options import ScanLineParams, Selection
 from .verdict import Case, Change, Verdict

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import _core
 from .constants import EDGE_JUMP, EDGE_OCCLUDING
-from .detector import selected, thin_lines
+from .detection import selected, thin_lines
 from .edges import EdgeStrength
 from .frame import Frame
 from .options import ScanLineParams, Selection

@@ -22,7 +22,7 @@ from .. import __version__
 from .._check import described, error, named
 from .._option import parsed, takes
 from ..boundaries import RegionBoundaries, boundaries_of
-from ..detector import selected, thin_lines
+from ..detection import selected, thin_lines
 from ..distance import distanceTransform
 from ..draw import drawRegions, edge_overview, region_overview
 from ..edges import EdgeStrength, measure_both
