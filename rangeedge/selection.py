@@ -76,7 +76,7 @@ def overallStrength(
     overallStrength(jump, crease, jumpCut[, creaseCut[, dst]]) -> dst
 
     dst = max(strengthImage(jump, jumpCut), strengthImage(crease, creaseCut)), so both kinds of edge share
-    one scale: what :func:`salienceDistanceTransform` takes as salience.
+    one scale: what `salienceDistanceTransform` takes as salience.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ def drawOverview(
     src : ndarray
         Range image (H, W), or points (H, W, 3) or (H, W, 4) of floats.
     strength : EdgeStrength
-        What :func:`edgeStrength` returns: jump, crease, kind and significance, each (H, W).
+        What `edgeStrength` returns: jump, crease, kind and significance, each (H, W).
     edges : ndarray of shape (H, W), CV_8U or bool
         Selected edges, non-zero on edges.
     distance : ndarray of shape (H, W), CV_32F, optional
