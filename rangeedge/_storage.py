@@ -14,17 +14,19 @@ import numpy as np
 
 from ._check import described, error, fail
 from .io.atomic import write_atomically
+from .io.source import file_name, opened
 from .noise_model import NoiseModel
 from .options import DETECTION
 
 _SUFFIXES = (".xml", ".yml", ".yaml", ".json")  # by which cv2.FileStorage knows the format
 # The first and the last key of a file that `save` has written: YAML that has lost its end is YAML again.
 _OPENING, _CLOSING = "savedBy", "complete"
+_DEPTH = 64  # levels of nesting
 
 
 def save(filename: str | os.PathLike[str], node: str, values: Mapping[str, Any]) -> None:
     """Write values into a file, as the node of that name; all of it or nothing."""
-    name = _file_name(filename)
+    name = file_name(filename, "filename")
     suffix = Path(name).suffix.lower()
     if suffix not in _SUFFIXES:
         raise fail("filename", f"a file name with one of the suffixes {' '.join(_SUFFIXES)}", repr(name))
@@ -41,12 +43,10 @@ def save(filename: str | os.PathLike[str], node: str, values: Mapping[str, Any])
 
 def load(filename: str | os.PathLike[str], node: str) -> tuple[str, dict[str, Any]]:
     """The name of a file, and the values under the node of that name in it."""
-    name = _file_name(filename)
-    try:
-        text = Path(name).read_text("utf-8")
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise error(f"cannot read {name!r}: {what}", cv2.Error.StsObjectNotFound) from reason
+    name = file_name(filename, "filename")
+    with opened(name) as (stream, size):
+        text = stream.read(size).decode()
+        _expect_shallow(text)
     # OpenCV 4.8 does not survive all files that have lost their end.
     if node not in text:
         raise error(f"{name!r} holds no `{node}`", cv2.Error.StsParseError)
@@ -95,10 +95,31 @@ def read(node: cv2.FileNode) -> dict[str, Any]:
     return values
 
 
-def _file_name(filename: Any) -> str:
-    if not isinstance(filename, (str, os.PathLike)):
-        raise fail("filename", "a file name", type(filename).__name__)
-    return os.fsdecode(filename)
+_BRACKETS = re.compile(r"([\[{]|<[A-Za-z_])|([\]}]|</|/>)")
+_INDENTATION = re.compile(r"\s*((?:-\s+)*)")
+
+
+def _expect_shallow(text: str) -> None:
+    """Refuses nesting that OpenCV, which follows it by recursion, does not survive."""
+    depth = 0
+    for bracket in _BRACKETS.finditer(text):
+        depth = depth + 1 if bracket[1] else max(0, depth - 1)
+        _expect_level(depth)
+    outer: list[int] = []  # columns at which the blocks begin that a line of YAML is in
+    for line in text.splitlines():
+        start = _INDENTATION.match(line)
+        if start is None or start.end() == len(line):
+            continue
+        while outer and outer[-1] >= start.start(1):
+            outer.pop()
+        dashes = start[1].count("-")
+        outer += [start.start(1)] * (dashes + 1)
+        _expect_level(len(outer))
+
+
+def _expect_level(depth: int) -> None:
+    if depth > _DEPTH:
+        raise ValueError(f"it is nested more than {_DEPTH} levels")
 
 
 def _write_node(fs: cv2.FileStorage, name: str, value: Any) -> None:
@@ -119,14 +140,16 @@ def _write_node(fs: cv2.FileStorage, name: str, value: Any) -> None:
         fs.write(name, float(value))
 
 
-def _node_value(node: cv2.FileNode) -> Any:
+def _node_value(node: cv2.FileNode, depth: int = 0) -> Any:
     """What `_write_node` has written, in the types of Python."""
+    if depth > _DEPTH:
+        raise error(f"it is nested more than {_DEPTH} levels", cv2.Error.StsParseError)
     if node.isInt():
         return int(node.real())
     if node.isReal():
         return node.real()
     if node.isSeq():
-        return tuple(_node_value(node.at(i)) for i in range(node.size()))
+        return tuple(_node_value(node.at(i), depth + 1) for i in range(node.size()))
     if not node.isMap():
         return node.string() if node.isString() else None
     keys = node.keys()
@@ -135,4 +158,4 @@ def _node_value(node: cv2.FileNode) -> Any:
             return node.mat()
         except cv2.error as problem:
             raise error(f"`{node.name()}` is a damaged matrix: {problem.err}", problem.code) from problem
-    return {key: _node_value(node.getNode(key)) for key in keys}
+    return {key: _node_value(node.getNode(key), depth + 1) for key in keys}

@@ -173,7 +173,7 @@ def _brackets(text: str) -> int:
 class _Flow:
     """A value in brackets or braces."""
 
-    _TOKEN = re.compile(r"""\s*([\[\]{},:]|"[^"]*"|'[^']*'|[^\s\[\]{},:"'][^\[\]{},:]*)""")
+    _TOKEN = re.compile(r"""([\[\]{},:]|"[^"]*"|'[^']*'|[^\s\[\]{},:"'][^\[\]{},:]*)""")
 
     def __init__(self, text: str) -> None:
         self.tokens = [token.strip() for token in self._TOKEN.findall(text)]
