@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import inspect
 from collections.abc import Callable
@@ -45,6 +46,9 @@ FLAGS = {
 }
 CAMERAS = [(50, 50, 16, 12), (1e-3, 1e3, 0, 0), (1e300, 1e-300, 0, 0), [[60, 2, 9], [0, 60, 9], [0, 0, 1]]]
 VECTORS = [(0, 0, 1), (0.1, -0.2, 1.5), [1e300, 0, 0], np.array([0, 0, 2.0]), (0, 0, 0), (TINY, 0, 0), (1e-200, 0, 1)]
+PLANES = np.array(
+    [[1.0, 0, 0, 1], [-1, 0, 0, 1], [0, 1, 0, 1], [0, -1, 0, 1], [0, 0, 1, 3], [0, 0, -1, -1]]  # of a box
+)
 UNITS = np.array([[0, 0, 1], [0.6, 0, 0.8], [0, -0.6, 0.8], [0, 0.28, 0.96], [0.48, 0.6, 0.64]])
 GIVEN = {
     "K": CAMERAS,
@@ -59,7 +63,7 @@ GIVEN = {
     "transform": [(0, 1, 0, 0, 0, 1)],
     "seed": [0, 7],
     "fits": [None, (0.1,) * 47, (0.0,) * 47, (1e300,) * 47],
-    "planes": [[[1, 0, 0, -1], [-1, 0, 0, -1], [0, 1, 0, -1], [0, -1, 0, -1], [0, 0, 1, -3], [0, 0, -1, 1]]],
+    "planes": [PLANES, PLANES[:5], PLANES * 1e150, PLANES * 1e-200],
     "errors": [np.array([0.1, -2, 3]), np.full(3, 1e300), np.zeros(5)],
     "creaseTruth": [np.full((24, 33), 20, np.float32)],
     "jumpTruth": [np.full((24, 33), 0.5, np.float32)],
@@ -97,7 +101,8 @@ def arguments(draw: Any, name: str, shape: tuple[int, int]) -> Any:
     if name in LABELS:
         return draw(images(shape, ["i4"]))
     if name in CODES:
-        return np.minimum(draw(images(shape, ["u1", "u2", "i4"])), 4095)
+        image = draw(images(shape, ["u1", "u2", "i4"]))
+        return image if image.dtype == np.uint8 else np.minimum(image, 4095)
     if name == "truth":
         return draw(images(shape, ["u1", "i4"]))
     if name in DEEP:
@@ -146,7 +151,12 @@ BROKEN_LINES = [
 CAMERA = synthetic.pinholeCamera(np.array([[40.0, 0, 16], [0, 40, 12], [0, 0, 1]]), (33, 24))
 SCENES = [synthetic.demoScene(), synthetic.roof(60), [], [synthetic.sphere((0, 0, 1), 0.2)], [None]]
 RENDERING = synthetic.renderScene(synthetic.roof(60), CAMERA)
-NOISY = ("gaussianNoise", "triangulationNoise", "abwNoise", "perceptronNoise", "kinectNoise")
+# The cameras of the scanners are known by their geometry, here of small images.
+OF_ABW, OF_PERCEPTRON = (
+    synthetic.renderScene([synthetic.plane((0, 0, 900), (0, 0, 1))], dataclasses.replace(camera, size=(33, 24)))
+    for camera in (synthetic.abwCamera(), synthetic.perceptronCamera())
+)
+NOISY = ("gaussianNoise", "triangulationNoise", "kinectNoise")
 EVERY_PARAMS = st.fixed_dictionaries(
     {}, optional={name: arguments(name, (24, 33)) for name in inspect.signature(rangeedge.ScanLineParams).parameters}
 )
@@ -181,8 +191,12 @@ MADE = {
     ("evaluateEdges", "kind"): [STRENGTH.kind],
     ("evaluateEdges", "jump"): [STRENGTH.jump],
     ("evaluateEdges", "crease"): [STRENGTH.crease],
-    ("box", "size"): VECTORS,
-    ("measureDetector", "size"): [8, 12],
+    ("box", "size"): [(1, 2, 3), (TINY, 1, 1), (1e300, 1, 1), (1, 1, -1)],
+    ("planePair", "first"): [UNITS[1], UNITS[2], UNITS[0]],
+    ("planePair", "second"): [UNITS[0], UNITS[3], -UNITS[1]],
+    ("planePair", "point"): [(0, 0, 1), (0.1, 0, 2)],
+    ("abwNoise", "rendering"): [OF_ABW],
+    ("perceptronNoise", "rendering"): [OF_PERCEPTRON],
     ("pinholeCamera", "size"): [(33, 24), (2, 2)],
     ("orthographicCamera", "size"): [(33, 24), (2, 2)],
     ("renderScene", "scene"): SCENES,
@@ -194,7 +208,7 @@ ALWAYS = {
     ("mapFrames", "jobs"): [1],
     ("mapFrames", "client"): [None, 5],
     ("analyseOptimality", "frequency"): [1, 2, 0, -1, 1.5, True, 10**400],
-    ("measureDetector", "size"): [8, 12, 0, -1, 1.5, True],
+    ("measureDetector", "size"): [16, 20, 24, 0, -1, 1.5, True],
     **{(name, "size"): [(33, 24), (2, 2), (1, 1), (2.5, 2), 5] for name in ("pinholeCamera", "orthographicCamera")},
 }
 LIKE_SCENE = {name for name, _ in MADE if name.startswith(("draw", "overall", "evaluate"))}
