@@ -1,7 +1,7 @@
 """Small images full of exact ties: kernels and the oracle agree on them as soon as the ties are broken.
 
-Which of two choices is taken that are equally good is a rule (of cuts the leftmost, of joints that of fewer samples, of
-Which of two choices is taken that are equally good is a rule (the leftmost cut, the joint of fewer samples, the first
+Which of two choices is taken that are equally good is a rule (of cuts the leftmost, of joints that of fewer samples,
+of extreme samples the first: `core/scanline/split.hpp`, `merge.cpp`, `segment_list.hpp`, `oracle/approximation.py`).
 But what is compared are sums that are rounded, in another order by the kernels than by the oracle: where exact
 arithmetic gives a tie that the rule does not foresee, they may choose differently. A fiftieth of the noise decides it.
 """
