@@ -25,7 +25,7 @@ constexpr int least_outlined = 3;      // samples of a surface beside a wide gap
 
 // Candidates of some lines, and the pixels over which steps are smeared there.
 struct Found {
-    std::vector<Candidate> candidates;
+    CandidateList candidates;
     std::vector<std::int32_t> smeared;
 };
 
@@ -271,8 +271,8 @@ void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, T
 }  // namespace
 
 template <class T>
-std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, Team& team,
-                                       std::uint8_t* smeared, std::vector<Candidate>* weak) {
+CandidateList find_candidates(const Frame<T>& frame, const ScanLineOptions& options, Team& team, std::uint8_t* smeared,
+                              CandidateList* weak) {
     std::vector<Part> parts = parts_of(options.directions, frame.rows, frame.cols);
     // Any thread may take any part: they are many, and what they cost differs.
     std::atomic<std::size_t> taken{0};
@@ -295,7 +295,7 @@ std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOpti
     for (const Part& part : parts)
         for (const Candidate& c : part.found.candidates) found.push_back(&c);
     NeighbourGrid grid(frame.rows, frame.cols, team);
-    std::vector<Candidate> candidates = in_place(found, grid);
+    CandidateList candidates = in_place(found, grid);
     parts.clear();
     join_neighbours(candidates, grid, frame, options, weak);
     return candidates;
@@ -340,7 +340,7 @@ LineTrace trace_line(const Frame<T>& frame, const ScanLineOptions& options, int 
     return trace;
 }
 
-void put_in_order(std::vector<Candidate>& candidates) {
+void put_in_order(CandidateList& candidates) {
     Checkpoints checkpoints;
     std::sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
         checkpoints.pass();
@@ -348,9 +348,9 @@ void put_in_order(std::vector<Candidate>& candidates) {
     });
 }
 
-#define RANGEEDGE_INSTANTIATE(T)                                                                                   \
-    template std::vector<Candidate> find_candidates(const Frame<T>&, const ScanLineOptions&, Team&, std::uint8_t*, \
-                                                    std::vector<Candidate>*);                                      \
+#define RANGEEDGE_INSTANTIATE(T)                                                                          \
+    template CandidateList find_candidates(const Frame<T>&, const ScanLineOptions&, Team&, std::uint8_t*, \
+                                           CandidateList*);                                               \
     template LineTrace trace_line(const Frame<T>&, const ScanLineOptions&, int, int, int);
 RANGEEDGE_INSTANTIATE(float)
 RANGEEDGE_INSTANTIATE(double)
