@@ -318,6 +318,18 @@ def test_bands_at_every_angle_are_lines_of_their_length(method, width):
             assert np.abs(np.mean(across[inner])) < 0.75
 
 
+@pytest.mark.parametrize("width", [8, 13, 20])
+def test_the_ends_of_a_broad_band_are_reached_in_its_middle(width):
+    """Not at its corners."""
+    rng = np.random.default_rng(5)
+    for degrees in np.arange(0, 180, 7.5):
+        edges, along, across = band(width, degrees, half_length=40, offset=rng.uniform(-1, 1, 2))
+        thin = thinEdges(edges) > 0
+        assert np.abs(across[thin]).max() < 3
+        assert along[thin].min() < -37
+        assert along[thin].max() > 37
+
+
 @every_method
 @pytest.mark.parametrize("width", [2, 3, 6])
 def test_bands_that_leave_the_image_are_lines_up_to_its_border(method, width):
