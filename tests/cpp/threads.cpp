@@ -35,7 +35,8 @@ bool is_given_up(F&& call) {
 
 // Passes checkpoints for a while.
 void work(Clock::duration time) {
-    for (const auto end = Clock::now() + time; Clock::now() < end; std::this_thread::sleep_for(1ms)) Watch::checkpoint();
+    for (const auto end = Clock::now() + time; Clock::now() < end; std::this_thread::sleep_for(1ms))
+        Watch::checkpoint();
 }
 
 void a_caller_asks_while_it_waits_for_others() {
@@ -63,7 +64,9 @@ void a_watch_that_ends_leaves_the_one_around_it() {
 }
 
 void without_a_watch_nothing_is_given_up() {
-    { Watch watch([] { throw GivenUp(); }); }
+    {
+        Watch watch([] { throw GivenUp(); });
+    }
     expect(!is_given_up([] { work(2 * Watch::period); }), "a watch that has ended is asked");
 }
 
