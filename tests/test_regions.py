@@ -534,10 +534,9 @@ def test_a_surface_is_curved_if_a_fifth_less_is_left_than_by_a_plane(share):
     noise = noise - whole @ np.linalg.lstsq(whole, noise, rcond=None)[0]
     bend = bend - terms @ np.linalg.lstsq(terms, bend, rcond=None)[0]
     bend *= np.sqrt(1 / share**2 - 1) * np.linalg.norm(noise) / np.linalg.norm(bend)
-    inverse = (1 + 0.2 * terms[:, 0] + 1e-3 * (noise + bend)).reshape(x.shape)
+    inverse = (terms @ (0.2, 0, 1) + 1e-3 * (noise + bend)).reshape(x.shape)
     around = SimpleNamespace(samples=rays / inverse[..., None])
     assert _curved(around, labels, 2).tolist() == curved
-
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # the loader leaves a file open
