@@ -26,7 +26,7 @@ from mutants_table import MUTANTS, Mutant
 
 ROOT = Path(__file__).resolve().parents[1]
 LEAST_CAUGHT = 0.95
-SLOWEST = 400  # seconds of one step; a mutant with which tests take longer is caught
+SLOWEST = 600  # seconds of one step; a mutant with which tests take longer is caught
 COMPILER, NO_END, CRASH = "the compiler", f"no end within {SLOWEST} s", "a crash"
 
 
@@ -35,7 +35,8 @@ class Copy:
 
     def __init__(self, folder: Path) -> None:
         self.root, self.build = folder / "tree", folder / "build"
-        self.left_out: list[str] = []  # tests, as options of pytest
+        self.stale = True  # whether the core is not built as it is written
+        self.left_out: set[str] = set()  # tests
         for name in ("rangeedge", "tests", "samples"):
             ignored = shutil.ignore_patterns("__pycache__", "*.so", "*.pyd")
             shutil.copytree(ROOT / name, self.root / name, ignore=ignored)
@@ -44,7 +45,6 @@ class Copy:
         nanobind = self.run(sys.executable, "-m", "nanobind", "--cmake_dir").stdout.strip()
         self.run("cmake", "-S", self.root / "rangeedge/core", "-B", self.build, "-DCMAKE_BUILD_TYPE=Release",
                  f"-Dnanobind_DIR={nanobind}", f"-DPython_EXECUTABLE={sys.executable}", check=True)  # fmt: skip
-        self.compile()
 
     def run(self, *command: object, check: bool = False) -> subprocess.CompletedProcess[str]:
         words, environment = list(map(str, command)), {**os.environ, "PYTHONPATH": str(self.root)}
@@ -53,40 +53,58 @@ class Copy:
         )
 
     def compile(self) -> bool:
+        if not self.stale:
+            return True
         if self.run("cmake", "--build", self.build, "--parallel", 2).returncode != 0:
             return False
         for module in self.build.glob("_core*.*"):
             if module.suffix in (".so", ".pyd", ".pyi"):
                 shutil.copy2(module, self.root / "rangeedge")
+        self.stale = False
         return True
 
-    def failed(self, *tests: str, left_out: Sequence[str] = ()) -> str:
-        """The first of these tests that fails; nothing where all pass."""
-        options = ["-x", "-q", "-p", "no:cacheprovider", f"--basetemp={self.root.parent / 'results'}"]
+    def failed(self, *tests: str, options: Sequence[str] = ("-x",)) -> list[str]:
+        """What fails of these tests."""
+        if not self.compile():
+            return [COMPILER]
+        options = [*options, "-q", "-p", "no:cacheprovider", f"--basetemp={self.root.parent / 'results'}"]
+        left_out = [f"--deselect={test}" for test in self.left_out]
         try:
             run = self.run(sys.executable, "-m", "pytest", *options, *left_out, *tests)
         except subprocess.TimeoutExpired:
-            return NO_END
+            return [NO_END]
         if run.returncode == 0:
-            return ""
-        named = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", run.stdout, re.MULTILINE)
-        return named[1] if named else CRASH
+            return []
+        return re.findall(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", run.stdout, re.MULTILINE) or [CRASH]
 
     def noticed(self, mutant: Mutant) -> str:
         """What notices the mutant; nothing where it survives."""
         path = self.root / "rangeedge" / mutant.file
         right = path.read_text()
-        core = mutant.file.startswith("core/")
         try:
             path.write_text(right.replace(mutant.right, mutant.wrong))
-            if core and not self.compile():
-                return COMPILER
-            files = [f"tests/test_{name}.py" for name in mutant.tests.split()]
-            return self.failed(*files, left_out=self.left_out)
+            self.stale |= mutant.file.startswith("core/")
+            return next(iter(self.failed(*(f"tests/test_{name}.py" for name in mutant.tests.split()))), "")
         finally:
             path.write_text(right)
-            if core:
-                self.compile()
+            self.stale |= mutant.file.startswith("core/")
+
+    def found(self, mutants: Sequence[Mutant]) -> dict[Mutant, str]:
+        """What notices each, other than tests that fail without any mutant; nothing where it survives."""
+        found: dict[Mutant, str] = {}
+        left = mutants
+        while left:
+            for mutant in left:
+                found[mutant] = self.noticed(mutant)
+                what = found[mutant] or "SURVIVED"
+                print(f"{what}: {mutant.file}: {mutant.right!r} -> {mutant.wrong!r}", flush=True)
+            failing = {found[mutant] for mutant in left} - {COMPILER, NO_END, CRASH, ""}
+            unsound = failing.intersection(self.failed(*sorted(failing), options=())) if failing else set()
+            for test in sorted(unsound):
+                print(f"left out, as it fails without any mutant: {test}", flush=True)
+            self.left_out |= unsound
+            left = [mutant for mutant in left if found[mutant] in unsound]
+        return found
 
 
 def misplaced() -> list[Mutant]:
@@ -107,17 +125,9 @@ def main() -> int:
     if options.list or not chosen:
         return int(bool(lost))
     with tempfile.TemporaryDirectory() as folder:
-        copy, caught, sound = Copy(Path(folder)), Counter[str](), {COMPILER, NO_END, CRASH, ""}
-        for mutant in chosen:
-            found = copy.noticed(mutant)
-            while found not in sound and copy.failed(found):
-                print(f"left out, as it fails without any mutant: {found}", flush=True)
-                copy.left_out.append(f"--deselect={found}")
-                found = copy.noticed(mutant)
-            sound.add(found)
-            caught[mutant.stage] += bool(found)
-            print(f"{found or 'SURVIVED'}: {mutant.file}: {mutant.right!r} -> {mutant.wrong!r}", flush=True)
-    for stage, count in Counter(m.stage for m in chosen).items():
+        found = Copy(Path(folder)).found(chosen)
+    caught = Counter(mutant.stage for mutant in chosen if found[mutant])
+    for stage, count in Counter(mutant.stage for mutant in chosen).items():
         print(f"{stage}: {caught[stage]} of {count}")
     print(f"{caught.total()} of {len(chosen)} caught")
     return int(bool(lost) or caught.total() < LEAST_CAUGHT * len(chosen))
