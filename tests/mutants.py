@@ -12,6 +12,7 @@ caught, or one has no place in the program.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import os
 import re
 import shutil
@@ -27,6 +28,7 @@ from mutants_table import MUTANTS, Mutant
 ROOT = Path(__file__).resolve().parents[1]
 LEAST_CAUGHT = 0.95
 SLOWEST = 600  # seconds of one step; a mutant with which tests take longer is caught
+MOST_MEMORY = 2**33  # bytes of a process; mutants may ask for any number
 COMPILER, NO_END, CRASH = "the compiler", f"no end within {SLOWEST} s", "a crash"
 
 
@@ -107,6 +109,14 @@ class Copy:
         return found
 
 
+def bound_memory() -> None:
+    """Of this process and of those that it starts."""
+    with contextlib.suppress(ImportError):  # on Windows
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_AS, (MOST_MEMORY, resource.getrlimit(resource.RLIMIT_AS)[1]))
+
+
 def misplaced() -> list[Mutant]:
     """Those whose text does not occur just once."""
     return [m for m in MUTANTS if (ROOT / "rangeedge" / m.file).read_text().count(m.right) != 1]
@@ -124,6 +134,7 @@ def main() -> int:
     print(f"{len(chosen)} mutants")
     if options.list or not chosen:
         return int(bool(lost))
+    bound_memory()
     with tempfile.TemporaryDirectory() as folder:
         found = Copy(Path(folder)).found(chosen)
     caught = Counter(mutant.stage for mutant in chosen if found[mutant])
