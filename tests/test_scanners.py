@@ -269,6 +269,18 @@ def test_surfaces_of_a_sector_are_planes():
     assert not surfaces["curved"].any()
 
 
+@pytest.mark.parametrize("half", [85, 130])
+def test_surfaces_of_several_sectors_that_do_not_close(half):
+    rays, ranges, faces = sweep(64, 20, (half, -half))
+    points = rays * (ranges + 0.003 * np.random.default_rng(4).standard_normal(ranges.shape))[..., None]
+    labels = segmentRegions(points)
+    for label in range(1, labels.max() + 1):
+        own = np.bincount(faces[labels == label], minlength=len(WALLS))
+        assert own.max() > 0.95 * own.sum()
+    assert np.count_nonzero(labels) > 0.98 * labels.size
+    assert near((detectEdges(points) > 0)[:, 4:-4], borders(faces)[:, 4:-4]) > 0.95
+
+
 @pytest.mark.parametrize("origin", [None, (4, -7, 1.1)])
 @pytest.mark.parametrize("columns", [0, 100, 250])
 def test_surfaces_all_around(columns, origin):
