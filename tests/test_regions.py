@@ -167,6 +167,24 @@ class TestGrowing:
             own = np.bincount(labels[strip].ravel()).argmax()
             assert (np.count_nonzero(labels == own) < 1000) == stays
 
+    def test_waves_of_the_noise_count_up_to_a_bound(self):
+        # Eight times what neighbours differ by: of two planes with waves, those within 36 deviations are one.
+        rng = np.random.default_rng(0)
+        waves = cv2.resize(rng.normal(0, 1, (26, 31)), (120, 100), interpolation=cv2.INTER_CUBIC)
+        src = 12 * waves / waves.std() + rng.normal(0, 1, waves.shape)
+        markers = markers_at(src.shape, (slice(5, 95), slice(5, 55)), (slice(5, 95), slice(65, 115)))
+        for step, count in ((30, 1), (45, 2)):
+            assert growRegions(src + step * (X >= 60), markers, heightMap=True, noise=1.0).max() == count
+
+    @pytest.mark.parametrize(("off", "labelled"), [(9, True), (15, False)])
+    def test_pixels_of_edges_may_lie_farther_off(self, off, labelled):
+        src = noisy(columns(0.1 * X))
+        src[20:60:4, 60] += off * SIGMA
+        edges = np.zeros(src.shape, np.uint8)
+        edges[:, 60] = 255
+        labels = growRegions(src, markers_at(src.shape, (slice(10, 70), slice(10, 110))), edges=edges, noise=SIGMA)
+        assert (labels[20:60:4, 60] > 0).all() == labelled
+
     def test_borders_move_to_where_surfaces_meet(self):
         # The edge is drawn beside the ridge, up to where pixels lie off the wrong plane by more than the tolerance.
         src = columns(np.where(X > 60, 0.25 * (X - 60), 0), 100)
