@@ -107,7 +107,7 @@ MUTANTS = [
         ("return {value - (start + step * abscissa) * m, -kappa * m};",
          "return {value + (start + step * abscissa) * m, -kappa * m};"),
         ("(frame->projective ? kappa * value : 1) * per_step", "per_step")),
-    *of("merging", "core/scanline/merge.cpp", "oracle edges significance",
+    *of("merging", "core/scanline/merge.cpp", "edges oracle significance",
         ("constexpr double bridge_factor = 2;", "constexpr double bridge_factor = 1;"),
         ("cost(i) < cost(previous(i)), after", "cost(i) <= cost(previous(i)), after"),
         ("            list_.sigma[i] = list_.sigma[right], list_.waves[i] = list_.waves[right];\n", ""),
