@@ -195,6 +195,14 @@ def test_gaps_are_not_bridged_between_edges_that_do_not_continue_each_other():
     assert len(tall) == 2
 
 
+def test_a_jump_ends_where_its_nearer_side_changes():
+    y, x = np.mgrid[:60, :80]
+    depth = np.where((x < 40) == (y < 30), 3.0, 4.0)
+    chains = linkEdges(depth, pixelSize=1, noise=0.001)
+    assert len(chains) == 4
+    assert all(chain.kind == EDGE_JUMP and 20 < chain.pixels < 45 for chain in chains)
+
+
 def test_a_chain_is_of_one_kind():
     """A ridge that goes on as a valley."""
     x = np.arange(81) - 40.2
