@@ -115,6 +115,14 @@ def test_middle_of_a_bar():
     )
 
 
+@pytest.mark.parametrize("wide", range(1, 6))
+def test_short_bars_are_lines_as_long_as_their_longer_side(wide):
+    for tall in range(wide + 1, 16):
+        bar = np.pad(np.full((tall, wide), 255, np.uint8), 2)
+        for thin in (thinEdges(bar), thinEdges(np.ascontiguousarray(bar.T)).T):
+            assert np.count_nonzero(thin) == np.count_nonzero(thin.any(axis=1)) == tall
+
+
 def test_of_two_middle_rows_the_upper_one():
     assert_thin(
         """
