@@ -29,6 +29,7 @@ from rangeedge import (
     detectEdges,
     edgePoints,
     edgeStrength,
+    explainPixel,
 )
 
 NAN = np.nan
@@ -433,3 +434,16 @@ def test_of_equal_creases_the_convex_one_tells_the_type(sign):
     assert across[0].crease[20, 20] == across[1].crease[20, 20]
     both = rangeedge.edgeStrength(saddle, directions=rangeedge.DIR_ROWS | rangeedge.DIR_COLS, **options)
     assert both.kind[20, 20] == rangeedge.EDGE_CONVEX
+
+
+def test_segments_end_at_pixels_without_data():
+    rng = np.random.default_rng(0)
+    x = np.arange(60)
+    z = 5 + 0.01 * x + np.where(x > 30, 0.05 * (x - 30), 0) + rng.normal(0, 0.01, (40, 60))
+    z[rng.random(z.shape) < 0.06] = np.nan
+    z[20, 30] = 6
+    for line in explainPixel(z, 30, 20, noise=0.01, pixelSize=1, reach=60).lines:
+        seen = np.isfinite(line.samples["depth"])
+        assert len(line.segments) > 1
+        for segment in line.segments:
+            assert seen[int(segment["first"]) : int(segment["last"]) + 1].all()
