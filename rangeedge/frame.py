@@ -57,6 +57,11 @@ class Frame:
         return self.samples.shape[:2]
 
     @property
+    def unit(self) -> str:
+        """Of lengths, where it is known: integers and `depthFactor` 1000 are millimetres, lengths metres then."""
+        return "m" if self.step == 1 / 1000 else ""
+
+    @property
     def threads(self) -> int:
         """How many threads the image is worth."""
         return threads_worth(self.shape[0] * self.shape[1])

@@ -14,6 +14,7 @@ from ..cancellation import apart
 from .source import HEADER_LIMIT, expect_at_least, expect_pixels, expect_unpacked, inflate
 from .text import numbers
 
+PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _PNG_COLOURS = {0: "grey values", 2: "colours", 3: "a palette", 4: "opacity", 6: "colours"}  # by colour type
 
 

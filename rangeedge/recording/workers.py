@@ -29,10 +29,7 @@ from .._check import error
 _PATIENCE = 0.05  # seconds between questions whether the wait is given up
 _GRACE = 0.1  # seconds in which a worker may tidy up
 _AHEAD = 3  # tasks a worker that are in flight: one at work, one waiting, one whose result waits for those before
-_UNGUARDED = (
-    "worker processes could not start: each runs the main program once more to know its functions, so that what calls"
-    ' this must stand under `if __name__ == "__main__":`, and what is above it must not fail'
-)
+_UNGUARDED = 73  # exit code of a worker that was about to run the whole program again
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 
 
@@ -69,6 +66,12 @@ def _is_full(problem: BaseException | None) -> bool:
     return False
 
 
+def expect_guard(jobs: int) -> None:
+    """Of a worker that runs the program itself as it begins: end, and leave it to its parent to say why."""
+    if jobs > 1 and getattr(multiprocessing.current_process(), "_inheriting", False):
+        os._exit(_UNGUARDED)
+
+
 def run_here(call: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Outcome]:
     """One task after the other, in this process."""
     return (attempt(call, task) for task in tasks)
@@ -76,7 +79,6 @@ def run_here(call: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Outco
 
 def run_local(call: Callable[[Any], Any], tasks: Iterable[Any], jobs: int) -> Iterator[Outcome]:
     """That many tasks at a time, each in a process of its own; outcomes in the order of the tasks."""
-    expect_main()
     pool = _Pool(jobs)
     waiting: deque[tuple[Any, Future[Outcome]]] = deque()
     tasks = iter(tasks)
@@ -90,7 +92,11 @@ def run_local(call: Callable[[Any], Any], tasks: Iterable[Any], jobs: int) -> It
             try:
                 outcome = _awaited(future)
             except BrokenProcessPool:
-                pool.expect_begun()
+                if pool.unguarded():
+                    raise error(
+                        f"`jobs` = {jobs} starts processes that run the program up to here themselves: put what it does"
+                        " under if __name__ == '__main__':"
+                    ) from None
                 pool.end()
                 suspects = [(task, future), *waiting]
                 waiting.clear()
@@ -132,12 +138,6 @@ def _alone(call: Callable[[Any], Any], task: Any, future: Future[Outcome]) -> Ou
         pool.end()
 
 
-def expect_main() -> None:
-    """Refuse to make workers in one that is running the main program to know its functions."""
-    if getattr(multiprocessing.current_process(), "_inheriting", False):
-        raise error(_UNGUARDED)
-
-
 class _Pool(ProcessPoolExecutor):
     """Workers that are made by a server: a copy of a process with threads, as OpenCV starts them, may hang."""
 
@@ -145,14 +145,13 @@ class _Pool(ProcessPoolExecutor):
         context = multiprocessing.get_context("forkserver")
         context.set_forkserver_preload([__name__, "rangeedge.app.results"])
         threads = max(1, (os.cpu_count() or 1) // jobs)
-        self._begun = context.Event()
-        super().__init__(jobs, context, _begin, (threads, self._begun))
+        super().__init__(jobs, context, _begin, (threads,))
         self._workers = self._processes
 
-    def expect_begun(self) -> None:
-        """Refuse to go on where no worker has come as far as its first task."""
-        if not self._begun.is_set():
-            raise error(_UNGUARDED) from None
+    def unguarded(self) -> bool:
+        """Whether it broke because a worker was about to run the whole program again."""
+        self.shutdown(cancel_futures=True)
+        return any(worker.exitcode == _UNGUARDED for worker in self._workers.values())
 
     def end(self) -> None:
         """Idle workers end, and those at work give it up; whoever is in the midst of a long step is killed."""
@@ -191,11 +190,10 @@ def _end(*_: Any) -> None:
     os._exit(1)
 
 
-def _begin(threads: int, begun: Any) -> None:
+def _begin(threads: int) -> None:
     """Of a worker: an interrupt is the business of the process that waits for it, and so is its end."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end)
-    begun.set()
     cv2.setNumThreads(threads)
     threading.Thread(target=_end_with_parent, daemon=True).start()
 

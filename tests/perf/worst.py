@@ -172,10 +172,15 @@ def functions() -> dict[str, Callable[[Images], Cases]]:
 
 
 def _lines(images: Images) -> Cases:
-    count = images.shape[0] * images.shape[1]
-    yield "typical", lambda: partial(rr.splitScanLine, images.frame.src.ravel() * 1e-3, 0.01)
+    rows, cols = images.shape
+
+    def split(line: np.ndarray, tolerance: float) -> None:
+        for _ in range(rows):
+            rr.splitScanLine(line, tolerance)
+
+    yield "typical", lambda: partial(split, np.resize(images.frame.src, cols) * 1e-3, 0.01)
     for name, make in adversaries.LINES.items():
-        yield name, lambda make=make: partial(rr.splitScanLine, make(count), 0.1)
+        yield name, lambda make=make: partial(split, make(cols), 0.1)
 
 
 def _explained(function: Callable[..., Any], src: np.ndarray, **told: Any) -> Any:
