@@ -80,7 +80,7 @@ def test_agrees_with_the_map(name):
     src, options = CASES[name]
     edges = detectEdges(src, **options)
     explained = changed = 0
-    for x, y in near_edges(edges, 7):
+    for x, y in near_edges(edges, 11):
         why = explainPixel(src, int(x), int(y), **options)
         assert why.edge == (edges[y, x] > 0)
         assert why.edge == (why.stage == "edge")
@@ -98,7 +98,7 @@ def test_agrees_with_the_map(name):
         else:
             rows, cols = np.nonzero(edges)
             assert np.hypot(rows - y, cols - x).min() > 24
-    assert changed >= 0.9 * explained > 5
+    assert changed >= 0.9 * explained > 3
 
 
 ROOF = 0.06 * np.abs(np.arange(80) - 40.3) * np.ones((60, 1)) + np.random.default_rng(0).normal(0, 0.02, (60, 80))
@@ -129,7 +129,7 @@ def test_of_an_edge_that_an_option_suppresses_the_option_is_named(name):
         options = {**known, **strict}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", rangeedge.RangeEdgeWarning)
-            gone = np.argwhere((edges > 0) & (detectEdges(src, **options) == 0))[::17]
+            gone = np.argwhere((edges > 0) & (detectEdges(src, **options) == 0))[::23]
             found = [explainPixel(src, int(x), int(y), **options) for y, x in gone]
         for why in found:
             count[bool(why.change)] += 1

@@ -53,7 +53,7 @@ def _unit(frame: Frame, params: ScanLineParams) -> str:
     """Of lengths, as far as it is known."""
     if frame.unit == "m":
         return "m (stored in mm)"
-    return f"units of {params.depthFactor:g} stored steps" if frame.step else "units of the stored values"
+    return f"{params.depthFactor:g} of the stored units" if frame.step else "that of the stored values"
 
 
 def _geometry(frame: Frame, params: ScanLineParams) -> str:
