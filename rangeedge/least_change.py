@@ -97,7 +97,10 @@ def _followed(trials: Trials, change: dict[str, Any]) -> tuple[dict[str, Any], s
         if case.edge != trials.case.edge:
             return change, ""
         verdict = case.verdict(case.lines(1))
-        reason = "" if verdict.stage == "no cut" else verdict.reason
+        given = ", ".join(
+            f"{name}={value if isinstance(value, int) else f'{value:.4g}'}" for name, value in change.items()
+        )
+        reason = "" if verdict.stage == "no cut" else f"With {given}: {verdict.reason}"
         more = next(iter(verdict.changes), {})
         if all(change.get(name) == value for name, value in more.items()):
             break

@@ -245,6 +245,18 @@ def test_faint_crease_names_its_significance():
     assert "edge" not in stages
 
 
+def test_what_is_still_in_the_way_is_said():
+    """A line that minLength drops, beside which the pixel lies: without that option it is selected, and thinned."""
+    roof = 0.5 * np.abs(np.arange(64) - 30.4) * np.ones((48, 1))
+    strength = rangeedge.edgeStrength(roof, noise=0.001)
+    thin = detectEdges(roof, noise=0.001)
+    y, x = np.argwhere((strength.crease > 30) & (thin == 0))[20]
+    why = explainPixel(roof, int(x), int(y), noise=0.001, minLength=60)
+    assert (why.stage, why.change) == ("line", {})
+    assert why.obstacle.startswith("With minLength=48: It is selected, but edges are one pixel wide")
+    assert f"No change of options was found that makes it one. {why.obstacle}" in str(why)
+
+
 def test_panorama():
     """A scanner that turns in a square room: the pixel is found in its sector."""
     turn, rise = np.meshgrid(np.linspace(-np.pi, np.pi, 720, endpoint=False), np.linspace(0.3, -0.3, 16))
