@@ -234,6 +234,11 @@ def selectEdges(*args: Any, **options: Any) -> np.ndarray:
     True
     """
     given = args[0] if args else options.get("strength")
+    if (
+        not isinstance(given, EdgeStrength)
+        and len(args) + len({"jump", "crease", "jumpThreshold"} & options.keys()) < 3
+    ):
+        raise _check.fail("strength", "of edgeStrength, or jump, crease and jumpThreshold", _check.described(given))
     return _of_strength(*args, **options) if isinstance(given, EdgeStrength) else _of_maps(*args, **options)
 
 

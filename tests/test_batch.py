@@ -288,6 +288,16 @@ class TestForms:
         assert (last["state"], last["outputs"]) == ("failed", {})
         assert "missing.png" in last["error"]
 
+    @pytest.mark.parametrize("change", [lambda data: data[:-1], lambda data: data + b"0"], ids=["shorter", "longer"])
+    def test_results_of_another_length_are_made_anew(self, stack, tmp_path, change):
+        path, out = stack[0], tmp_path / "out"
+        assert states(runBatch(path, out, form="png")) == ["written"] * 3
+        result = out / "walk" / "0001.png"
+        whole = result.read_bytes()
+        result.write_bytes(change(whole))
+        assert states(runBatch(path, out, form="png")) == ["skipped", "written", "skipped"]
+        assert result.read_bytes() == whole
+
     def test_chunks_of_a_store(self, stack, tmp_path):
         zarr = pytest.importorskip("zarr")
         path, depth = stack
