@@ -41,8 +41,9 @@ def sentence(known: dict[str, Any]) -> str:
         return f"{known['geometry']}, no data"
     low, high = known["depthRange"]
     jump = known["jumpThreshold"]
+    what = "heights" if known["geometry"].startswith("heights") else "depths"
     return (
-        f"{known['geometry']}, unit: {known['unit']}; depths {low:.4g} to {high:.4g},"
+        f"{known['geometry']}, unit: {known['unit']}; {what} {low:.4g} to {high:.4g},"
         f" pixels {known['pixelSpacing']:.3g} apart,"
         f" noise {known['noiseAtMedian']:.2g} at the median {known['medianDepth']:.4g}; jumps"
         f" {jump if isinstance(jump, str) else f'from {jump:g}'}, creases from {known['creaseThreshold']:g} degrees"
