@@ -37,7 +37,9 @@ class Trials:
     def __init__(self, case: Case, selection: Selection) -> None:
         self.case, self.given = case, selection
         self.base = {**vars(case.params), **vars(case.selection)}
-        self.base["jumpThreshold"] = self.base["jumpThreshold"] or 0.0
+        largest = 2 * float(case.strength.jump.max(initial=0)) / case.selection.hysteresis
+        self.base["jumpThreshold"] = min(self.base["jumpThreshold"] or 0.0, largest)  # inf, or as good as that
+        self.base["creaseThreshold"] = min(self.base["creaseThreshold"], _ANGLES / case.selection.hysteresis)
         self._latest: tuple[ScanLineParams, EdgeStrength] = case.params, case.strength
 
     def options(self, change: Change) -> tuple[ScanLineParams, Selection]:

@@ -149,6 +149,15 @@ def test_change_is_a_round_number_that_hardly_exceeds_what_is_needed():
     assert explainPixel(roof, 30, 20, creaseThreshold=60.0, noise=0.001).change == {"creaseThreshold": 20.0}
 
 
+def test_thresholds_that_switch_a_kind_off_have_a_change_too():
+    step = np.where(np.arange(40) < 20, 1.0, 1.2468) * np.ones((30, 1))
+    roof = 0.2 * np.abs(np.arange(64) - 30.3) * np.ones((48, 1))  # 22.62 degrees
+    off = explainPixel(step, 19, 15, np.inf, noise=0.001).change["jumpThreshold"]
+    assert 0.22 <= off <= 0.2468
+    off = explainPixel(roof, 30, 20, creaseThreshold=np.inf, noise=0.001).change["creaseThreshold"]
+    assert 10 <= off <= 22.62
+
+
 def test_of_several_options_that_drop_a_line_the_one_is_named_that_changes_the_fewest_others():
     """A short step beside long ones, larger than these, and as significant."""
     surface = np.ones((60, 60))
