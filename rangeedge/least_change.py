@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,11 +44,8 @@ class Trials:
         self._latest: tuple[ScanLineParams, EdgeStrength] = case.params, case.strength
 
     def options(self, change: Change) -> tuple[ScanLineParams, Selection]:
-        params, selection = (
-            type(own)(**{**vars(own), **{name: value for name, value in change.items() if name in own.options}})
-            for own in (self.case.params, self.given)
-        )
-        return params, selection
+        own = [{n: value for n, value in change.items() if n in kind.options} for kind in (ScanLineParams, Selection)]
+        return replace(self.case.params, **own[0]), replace(self.given, **own[1])
 
     def strength(self, params: ScanLineParams) -> EdgeStrength:
         if params == self.case.params:
