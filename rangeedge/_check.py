@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import cv2
 import numpy as np
 
+from . import _core
+
 if TYPE_CHECKING:
     from .io.camera import Camera
 
 # Kernels count in 32 bits what a pixel may have four of: edge points, one a direction of scan lines, and borders.
 PIXEL_LIMIT = 2**29
 
+_call = _core.Call()
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
@@ -56,7 +59,7 @@ def named(name: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
         @functools.wraps(function)
         def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
             # Values may be so large or so small that they overflow: what comes of it counts as invalid, in silence.
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), _call:
                 try:
                     return function(*args, **kwargs)
                 except error as problem:

@@ -22,6 +22,7 @@ from .. import __version__
 from .._check import described, error, named
 from .._option import parsed, takes
 from ..boundaries import RegionBoundaries, boundaries_of
+from ..cancellation import apart
 from ..detection import selected, thin_lines
 from ..distance import distanceTransform
 from ..draw import drawRegions, edge_overview, region_overview
@@ -208,7 +209,7 @@ def plain(value: Any) -> Any:
 
 def encoded(suffix: str, picture: np.ndarray) -> bytes:
     """A picture as the content of a file."""
-    return cv2.imencode(suffix, picture)[1].tobytes()
+    return apart(picture.size, cv2.imencode, suffix, picture)[1].tobytes()
 
 
 def _points_csv(points: np.ndarray) -> bytes:
