@@ -162,6 +162,14 @@ def real(value: float | np.integer | np.floating) -> float:
         return np.inf if value > 0 else -np.inf
 
 
+def reals(value: Any) -> np.ndarray:
+    """Numbers, nested as they may be, in double precision; a TypeError or ValueError where there are others."""
+    array = np.array(value)
+    if array.dtype.kind not in "buifO" or isinstance(value, np.ma.MaskedArray):
+        raise TypeError(f"{array.dtype} is no real number")
+    return array.astype(np.float64)
+
+
 def integer(name: str, value: Any, low: int, high: int = 2**31 - 1) -> int:
     """An integer in [low, high]; bool is none."""
     expected = f"an integer >= {low}" if high == 2**31 - 1 else f"an integer from {low} to {high}"
@@ -212,7 +220,7 @@ def distortion(name: str, value: Any) -> np.ndarray:
     """Coefficients of distortion as float64, as many as cv2 knows."""
     expected = "4, 5, 8, 12 or 14 finite numbers"
     try:
-        coefficients = np.array(value, dtype=np.float64).ravel()
+        coefficients = reals(value).ravel()
     except (TypeError, ValueError, OverflowError):
         raise fail(name, expected, described(value)) from None
     if len(coefficients) not in (4, 5, 8, 12, 14) or not np.isfinite(coefficients).all():

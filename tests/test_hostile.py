@@ -79,6 +79,22 @@ def test_errors_whose_squares_are_beyond_double_precision():
     assert (statistics.mean, statistics.largest, statistics.over) == (1e300, 1e300, 1.0)
 
 
+COMPLEX = np.array([1 + 2j] * 6)
+
+
+@pytest.mark.parametrize("values", [COMPLEX, COMPLEX.real.astype("m8[s]"), COMPLEX.real.astype(str), np.ma.ones(6)])
+def test_numbers_that_are_not_real(values):
+    for call in (
+        lambda: rangeedge.edgeStrength(DEPTH, K=values[:4]),
+        lambda: rangeedge.edgeStrength(DEPTH, K=(1, 1, 1, 1), distCoeffs=values[:4]),
+        lambda: rangeedge.writeLines("x.geojson", rangeedge.linkEdges(DEPTH), values),
+        lambda: rangeedge.sweepToPoints(DEPTH[:6, :6], values, np.arange(6.0)),
+        lambda: synthetic.sphere(values[:3], 1),
+    ):
+        with pytest.raises(rangeedge.error, match="must be"):
+            call()
+
+
 def test_planes_that_are_parallel_have_no_edge():
     flat = np.array([[0.0, 0, 1]])
     assert np.isnan(optimality.measureDetector(flat, flat, 90.0, size=20, seed=7)).all()
