@@ -152,6 +152,39 @@ def test_saliences_that_change_meanwhile(method):
         writer.join()
 
 
+V, U = np.mgrid[:200, :300]
+BLOCKS = 1 + U // 30 + 10 * (V // 20)
+CHANGING = {
+    "labels": (BLOCKS.astype(np.int32), lambda labels: rangeedge.regionBoundaries(labels)),
+    "distance": (np.hypot(U % 30 - 15, V % 20 - 10).astype(np.float32), lambda d: rangeedge.extractSeedsWithStats(d)),
+    "mask": (np.ones(U.shape, np.uint8), lambda mask: rangeedge.extractSeeds(np.hypot(U % 30, V % 20), mask=mask)),
+}
+
+
+@pytest.mark.parametrize("name", CHANGING)
+def test_images_that_change_meanwhile(name):
+    """What a kernel reads twice, and uses as an index, is a copy."""
+    original, call = CHANGING[name]
+    image, rng, stop = original.copy(), np.random.default_rng(0), threading.Event()
+
+    def write():
+        extreme = np.iinfo(image.dtype).max if image.dtype == np.int32 else 1e9 if image.dtype == np.float32 else 0
+        while not stop.is_set():
+            where = rng.integers(0, image.size, 2000)
+            image.flat[where] = extreme if rng.random() < 0.5 else 0
+            image.flat[where] = original.flat[where]
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        for _ in range(100):
+            with contextlib.suppress(rangeedge.error):
+                call(image)
+    finally:
+        stop.set()
+        writer.join()
+
+
 def unaligned(values):
     raw = np.empty(values.nbytes + 1, np.uint8)[1:]
     raw[:] = np.ascontiguousarray(values).view(np.uint8).ravel()
