@@ -177,7 +177,7 @@ def test_images_that_change_meanwhile(name):
     writer = threading.Thread(target=write)
     writer.start()
     try:
-        for _ in range(100):
+        for _ in range(40):
             with contextlib.suppress(rangeedge.error):
                 call(image)
     finally:
