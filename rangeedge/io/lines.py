@@ -120,7 +120,7 @@ def readLines(filename: str | os.PathLike[str]) -> list[Line]:
 
     Formats hold different things: all have kinds and, but for SVG, points; CSV, PLY and SVG pixels; CSV and GeoJSON all
     properties, SVG and DXF too, PLY the angle alone. GeoJSON with a transform has map coordinates for x and y. In a
-    PLY file lines of a single point are lost.
+    PLY file lines of a single point are lost, in PLY and CSV those without points.
 
     Parameters
     ----------

@@ -35,8 +35,9 @@ class Line(NamedTuple):
         The same in space.
     properties : dict
         Numbers, booleans, and lists of them: of a chain jump, crease, significance and length; of a segment jump,
-        dihedral, length, rms, endDeviation, directionDeviation and vertices; of an arc center, normal, radius, angle
-        and more that `fitArcs` tells, while its pixels are not known; of a ring label, region, hole and area.
+        dihedral, length, rms, endDeviation, directionDeviation, lengthDeviation and vertices; of an arc center, normal,
+        radius, angle and more that `fitArcs` tells, while its pixels are not known; of a ring label, region, hole and
+        area.
     """
 
     kind: str
@@ -132,7 +133,7 @@ def _of_chains(chains: Sequence[EdgeChain]) -> Iterator[Line]:
 
 def _of_segments(segments: np.ndarray) -> Iterator[Line]:
     for segment in segments:
-        names = ("jump", "dihedral", "length", "rms", "endDeviation", "directionDeviation")
+        names = ("jump", "dihedral", "length", "rms", "endDeviation", "directionDeviation", "lengthDeviation")
         known: dict[str, Any] = {name: float(segment[name]) for name in names}
         known["vertices"] = segment["vertices"].tolist()
         yield Line(kindNames(int(segment["kind"])), False, segment["pixels"].copy(), segment["ends"].copy(), known)
