@@ -176,6 +176,60 @@ def test_clouds_in_another_frame(place, given):
     assert segmentRegions(points, **options).max() == segmentRegions(z, K=K).max()
 
 
+FIELDS = [(64, 45, (180, -180)), (96, 22, (135, -135)), (100, 15, (60, -60))]
+
+
+@pytest.mark.parametrize("place", [(100, -20, 3), (1, 0, 0), (0, 0, 1), (0.3, 0.2, 0.1), (400000, 5e6, 120)])
+@pytest.mark.parametrize(("rows", "elevation", "azimuth"), FIELDS)
+def test_scans_in_another_frame(rows, elevation, azimuth, place):
+    rays, ranges, _ = sweep(rows, elevation, azimuth)
+    points = rays * (ranges + 0.005 * np.random.default_rng(1).standard_normal(ranges.shape))[..., None]
+    right = detectEdges(points) > 0
+    moved = points @ turned((20, -50, 140)).T + np.array(place)
+    np.testing.assert_allclose(read_frame(moved, ScanLineParams()).origin, place, atol=0.05)
+    edges = detectEdges(moved) > 0
+    assert near(edges, right) > 0.98
+    assert near(right, edges) > 0.98
+
+
+@pytest.mark.parametrize("place", [(0, 0, 0), (4, 0, 0), (0.3, 0.2, 0.1), (400000, 5e6, 120)])
+def test_a_narrow_scan_is_not_seen_in_parallel(place):
+    rays, ranges, _ = sweep(128, 10, (10, -10))  # columns and walls are upright
+    ranges[40:90, 150:330] *= 0.6  # a card before the wall
+    right = detectEdges(rays * ranges[..., None]) > 0
+    points = rays * ranges[..., None] + np.array(place)
+    frame = read_frame(points, ScanLineParams())
+    assert frame.projective
+    np.testing.assert_allclose(frame.origin, place, atol=0.05)
+    assert right.any()
+    assert near(detectEdges(points) > 0, right) > 0.98
+
+
+@pytest.mark.parametrize("place", [(0, 0, 0), (0.05, 0.02, 0), (-4, -0.3, -0.2), (56, -31, 18), (-900, 1200, -2000)])
+@pytest.mark.parametrize("scene", ["wall", "corner", "card"])
+def test_images_of_few_planes_in_another_frame(scene, place):
+    rays = rays_of()
+    x, y = rays[..., 0], rays[..., 1]
+    z = {"wall": 3 / (1 + 0.3 * x), "corner": 3 / (1 + 0.5 * abs(x - 0.01)), "card": 3 + 0 * x}[scene]
+    z = np.where((abs(x) < 0.2) & (abs(y) < 0.15), 2.0, z) if scene == "card" else z
+    z = z + 0.001 * np.random.default_rng(4).standard_normal(z.shape)
+    right = detectEdges(z, K=K) > 0
+    points = (rays * z[..., None]) @ turned((30, 100, -20)).T + np.array(place)
+    edges = detectEdges(points) > 0
+    assert edges.any() == right.any()
+    if right.any():
+        assert near(edges, right) > 0.98
+        assert near(right, edges) > 0.98
+
+
+def test_rows_of_a_scan_that_are_shifted_are_refused():
+    rays, ranges, _ = sweep(64, 22.5, (180, -180))
+    points = rays * ranges[..., None]
+    raw = np.stack([np.roll(row, (0, 6, 12, 18)[i % 4], axis=0) for i, row in enumerate(points)])
+    with pytest.raises(rangeedge.error, match="by origin"):
+        detectEdges(raw)
+
+
 def test_points_that_are_seen_from_nowhere_are_refused():
     points = np.random.default_rng(3).normal(size=(20, 30, 3)) + np.array([0, 0, 5])
     with pytest.raises(rangeedge.error, match="by origin"):
