@@ -19,7 +19,7 @@ def of(stage: str, file: str, tests: str, *edits: tuple[str, str]) -> list[Mutan
 
 MUTANTS = [
     # ---- Range images ----
-    *of("readers", "io/source.py", "broken_files io",
+    *of("readers", "io/source.py", "broken_files io scanner_files",
         ("if rows * cols > PIXEL_LIMIT:", "if False:"),
         ("if unpacked > max(UNPACKED_FREELY, UNPACKED_RATIO * packed):", "if unpacked > UNPACKED_RATIO * packed:"),
         ("    if found != needed:", "    if found < needed:")),
