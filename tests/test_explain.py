@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge import NoiseModel, detectEdges, drawExplanation, explainPixel
+from rangeedge import EDGE_CONVEX, NoiseModel, detectEdges, drawExplanation, explainPixel
 from rangeedge.app.cli import main
 from rangeedge.draw.explanation import _ticks
-from rangeedge.options import DETECTION
+from rangeedge.edges import EdgeStrength
+from rangeedge.frame import read_frame
+from rangeedge.options import DETECTION, ScanLineParams, Selection
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
+from rangeedge.verdict import Case
 
 CAMERA = pinholeCamera(np.array([[80.0, 0, 39.5], [0, 80.0, 29.5], [0, 0, 1]]), (80, 60))
 K = CAMERA.geometry["K"]
@@ -245,6 +248,18 @@ def test_every_stage_by_hand():
     lost = explainPixel(step, 19, 15, noise=0.001, minSignificance=1e4)
     assert (lost.stage, lost.limit) == ("significance", 1e4)
     assert lost.change["minSignificance"] < lost.value
+
+
+def test_a_stray_crease_needs_the_fourth_strongest_around_it():
+    params = ScanLineParams(pixelSize=1)
+    frame = read_frame(np.ones((9, 9)), params).with_noise(0.01)
+    crease = np.zeros((9, 9), np.float32)
+    crease[[4, 3, 5, 4, 4], [4, 4, 4, 5, 3]] = 40, 35, 27.25, 25.5, 20
+    kind = np.where(crease > 0, EDGE_CONVEX, 0).astype(np.uint8)
+    strength = EdgeStrength(np.zeros_like(crease), crease, kind, np.full_like(crease, 50))
+    verdict = Case(frame, strength, params, Selection(), 4, 4).verdict(())
+    assert (verdict.stage, verdict.value, verdict.limit) == ("stray", 2, 4)
+    assert verdict.changes[0]["creaseThreshold"] == pytest.approx(25.5, rel=0.01)
 
 
 def test_faint_crease_names_its_significance():
