@@ -141,7 +141,6 @@ def edge_files(found: EdgeResults, title: str, options: Mapping[str, Any]) -> di
     }
 
 
-@named("segment")
 def on_map(image: RangeImage | None) -> dict[str, Any]:
     """What GeoJSON takes of an image that lies on a map."""
     return {} if image is None else {"transform": image.georeference, "epsg": image.epsg}
@@ -152,6 +151,7 @@ def outlines_of(found: RegionResults) -> RegionBoundaries:
     return boundaries_of(found.labels, found.edges.frame, _OUTLINE)
 
 
+@named("segment")
 def region_files(
     found: RegionResults, title: str, options: Mapping[str, Any], image: RangeImage | None = None
 ) -> dict[str, bytes]:

@@ -108,16 +108,16 @@ def write_numbers(picture: np.ndarray, labels: np.ndarray) -> int:
 
 
 def _middles(labels: np.ndarray) -> Iterator[tuple[int, tuple[int, int], float]]:
-    """Of every region the label, the pixel farthest from its border, and how far that is."""
+    """Of every region with an inside the label, the pixel farthest from its border, and how far that is."""
     framed = np.pad(labels, 1)
     inside = labels > 0
     for row, col in ((0, 1), (2, 1), (1, 0), (1, 2)):
         inside &= framed[row : row + labels.shape[0], col : col + labels.shape[1]] == labels
     room = cv2.distanceTransform(np.pad(inside.view(np.uint8), 1), cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1] + 1
-    order = np.argsort(room, axis=None, kind="stable")
-    order = order[labels.flat[order] > 0]
-    names, last = np.unique(labels.flat[order[::-1]], return_index=True)
-    for label, place in zip(names.tolist(), order[::-1][last].tolist(), strict=True):
+    peaks = np.flatnonzero((room == cv2.dilate(room, np.ones((3, 3), np.uint8))) & (labels > 0))
+    peaks = peaks[np.argsort(-room.flat[peaks], kind="stable")]
+    names, first = np.unique(labels.flat[peaks], return_index=True)
+    for label, place in zip(names.tolist(), peaks[first].tolist(), strict=True):
         yield label, divmod(place, labels.shape[1]), float(room.flat[place])
 
 
