@@ -11,6 +11,8 @@ import numpy as np
 from . import _core
 from ._check import image8, labels32s
 from ._option import parsed, takes
+from .bands import bands, by_bands
+from .cancellation import apart
 from .constants import CLEAN_FILLED, CLEAN_REMOVED, CLEAN_SMOOTHED
 from .detection import selected, thin_lines
 from .edges import kernel_options, no_strength
@@ -181,7 +183,7 @@ def _distance(where: np.ndarray) -> np.ndarray:
     """From every pixel of `where` to the nearest other one; infinite if there is none."""
     if where.all():
         return np.full(where.shape, np.inf)
-    return cv2.distanceTransform(where.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return apart(where.size, cv2.distanceTransform, where.view(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
 
 
 def _smoothed(
@@ -189,8 +191,10 @@ def _smoothed(
 ) -> np.ndarray:
     """The ordinate along the axis of every pixel that lies on a surface, NaN elsewhere."""
     measured, offset, _ = relative_ordinate(frame)
-    relative = np.where(flying, np.float32(np.nan), measured)
-    mixed = np.where(flying, measured, np.float32(np.nan))
+    relative, mixed = (
+        by_bands(lambda own, here: np.where(here, own, np.float32(np.nan)), measured, which)
+        for which in (~flying, flying)
+    )
     x, y, _ = places(frame)
     if x is not None and params.distCoeffs is not None:
         rays = distorted_rays(params.K, params.distCoeffs, frame.shape) * params.K[0, 0]
@@ -199,7 +203,7 @@ def _smoothed(
     smoothed = np.empty(frame.shape, np.float32)
     count = int(labels.max()) + 1
     _core.clean_surfaces(relative, x, y, holes, mixed, count, zero, max(radius, 0.01), frame.threads, labels, smoothed)
-    return smoothed.astype(np.float64) + offset
+    return by_bands(lambda own: own.astype(np.float64) + offset, smoothed)
 
 
 def _smoothed_points(
@@ -221,12 +225,16 @@ def _smoothed_points(
 
 def _lengths(values: np.ndarray, ordinate: np.ndarray, frame: Frame, params: ScanLineParams) -> np.ndarray:
     """What an image of the type of `values` holds for ordinates."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        lengths = 1 / ordinate if frame.projective else ordinate * (1 if frame.heightMap else -1)
-    if values.dtype.kind == "f":
-        return lengths
-    info = np.iinfo(values.dtype)
-    return np.clip(np.rint(np.nan_to_num(lengths) * params.depthFactor), info.min + 1, info.max)
+
+    def lengths(ordinate: np.ndarray) -> np.ndarray:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            own = 1 / ordinate if frame.projective else ordinate * (1 if frame.heightMap else -1)
+        if values.dtype.kind == "f":
+            return own
+        info = np.iinfo(values.dtype)
+        return np.clip(np.rint(np.nan_to_num(own) * params.depthFactor), info.min + 1, info.max)
+
+    return by_bands(lengths, ordinate)
 
 
 def _delivered(
@@ -239,14 +247,17 @@ def _delivered(
     cleaning: Cleaning,
 ) -> CleanedDepth:
     """The image with its `new` values where these are `known` and wanted."""
-    there = (frame.valid > 0) & ~flying
-    smoothed, filled = known & there & (cleaning.radius > 0), known & ~there
-    depth = values.copy()
+    depth, changed = np.empty(values.shape, values.dtype), np.empty(frame.shape, np.uint8)
     lengths = depth[..., :3] if depth.ndim == 3 else depth
-    lengths[smoothed | filled] = new[smoothed | filled]
-    lengths[flying & ~filled] = _no_data(values, params)
-    changed = CLEAN_SMOOTHED * smoothed + CLEAN_REMOVED * flying + CLEAN_FILLED * filled
-    return CleanedDepth(depth, changed.astype(np.uint8))
+    for rows in bands(depth):
+        there = (frame.valid[rows] > 0) & ~flying[rows]
+        smoothed, filled = known[rows] & there & (cleaning.radius > 0), known[rows] & ~there
+        depth[rows] = values[rows]
+        own = lengths[rows]
+        own[smoothed | filled] = new[rows][smoothed | filled]
+        own[flying[rows] & ~filled] = _no_data(values, params)
+        changed[rows] = CLEAN_SMOOTHED * smoothed + CLEAN_REMOVED * flying[rows] + CLEAN_FILLED * filled
+    return CleanedDepth(depth, changed)
 
 
 def _no_data(values: np.ndarray, params: ScanLineParams) -> float:
