@@ -249,7 +249,7 @@ MUTANTS = [
         ("    if not dst.flags.writeable:", "    if False:"),
         ("    if dst.shape != result.shape or dst.dtype != result.dtype:", "    if dst.shape != result.shape:"),
         ("    if listed and value.max() > most:", "    if False:"),
-        ('            with np.errstate(all="ignore"):', "            with np.errstate():")),
+        ('np.errstate(all="ignore"), _call:', "np.errstate(), _call:")),
     *of("arguments", "_storage.py", "hostile",
         ('(node and not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_ -]*", node))', "False")),
 ]  # fmt: skip
