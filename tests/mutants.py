@@ -36,7 +36,7 @@ class Copy:
     """A copy of the program in which the core is built."""
 
     def __init__(self, folder: Path) -> None:
-        self.root, self.build = folder / "tree", folder / "build"
+        self.root, self.build = folder / "tree", folder / "tree/build/mutants"
         self.stale = True  # whether the core is not built as it is written
         self.left_out: set[str] = set()  # tests
         for name in ("rangeedge", "tests", "samples"):

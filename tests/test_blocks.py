@@ -48,6 +48,14 @@ class TestGrid:
         assert (seen == 1).all()
         assert grid.counts == (3, 4)
 
+    def test_strips_beyond_a_block_are_of_the_blocks_beside_and_below(self):
+        grid = Grid((23, 31), 8)
+        for index in range(len(grid)):
+            for other, strip in grid.beyond(index, 3):
+                top, left, bottom, right = grid.window(other)
+                assert top <= strip[0] < strip[2] <= bottom
+                assert left <= strip[1] < strip[3] <= right
+
     def test_clearance_is_the_distance_to_the_nearest_unseen_pixel(self):
         grid = Grid((23, 31), 8)
         for index in range(len(grid)):

@@ -376,3 +376,9 @@ def test_noise_that_is_larger_over_many_pixels_is_said_to_be():
     assert waves.correlation == 4.2
     assert "noise 0.002 m (correlated: 4.2 times that over many pixels);" in str(waves)
     assert "noise 0.002 m;" in str(explainPixel(image, 10, 10, noise=0.002, **known))
+
+
+def test_the_depth_of_heights_is_their_height():
+    for sign in (1, -1):
+        assert explainPixel(np.full((20, 30), 7.5 * sign), 5, 6, noise=0.1, heightMap=True).depth == 7.5 * sign
+    assert explainPixel(np.full((20, 30), 7.5), 5, 6, noise=0.1).depth == 7.5
