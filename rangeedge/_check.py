@@ -200,12 +200,14 @@ def camera_matrix(name: str, value: Any) -> np.ndarray:
 def camera_file(name: str, path: str | os.PathLike[str]) -> Camera:
     """The camera that a file describes."""
     from .io.camera import read_camera
+    from .io.source import file_name
 
+    path = file_name(path, name)
     try:
         return read_camera(path)
     except (OSError, ValueError) as reason:
         what = getattr(reason, "err", None) or getattr(reason, "strerror", None) or reason
-        raise fail(name, "a camera or the name of a file of one", f"{os.fspath(path)!r} ({what})") from None
+        raise fail(name, "a camera or the name of a file of one", f"{path!r} ({what})") from None
 
 
 def distortion(name: str, value: Any) -> np.ndarray:

@@ -13,18 +13,21 @@ import cv2
 import numpy as np
 
 from ._check import described, error, fail
-from .io.atomic import write_atomically
+from .io.atomic import write_atomically, writing
+from .io.settings import parse
+from .io.source import file_name, opened
 from .noise_model import NoiseModel
 from .options import DETECTION
 
 _SUFFIXES = (".xml", ".yml", ".yaml", ".json")  # by which cv2.FileStorage knows the format
+_TYPES = dict(zip("ucwsifd", ("u1", "i1", "u2", "i2", "i4", "f4", "f8"), strict=True))  # of cv2's matrices
 # The first and the last key of a file that `save` has written: YAML that has lost its end is YAML again.
 _OPENING, _CLOSING = "savedBy", "complete"
 
 
 def save(filename: str | os.PathLike[str], node: str, values: Mapping[str, Any]) -> None:
     """Write values into a file, as the node of that name; all of it or nothing."""
-    name = _file_name(filename)
+    name = file_name(filename, "filename")
     suffix = Path(name).suffix.lower()
     if suffix not in _SUFFIXES:
         raise fail("filename", f"a file name with one of the suffixes {' '.join(_SUFFIXES)}", repr(name))
@@ -32,39 +35,21 @@ def save(filename: str | os.PathLike[str], node: str, values: Mapping[str, Any])
     fs.write(_OPENING, "rangeedge")
     write(fs, node, values)
     fs.write(_CLOSING, 1)
-    try:
+    with writing(name):
         write_atomically(name, fs.releaseAndGetString().encode())
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise error(f"cannot write {name!r}: {what}", cv2.Error.StsError) from reason
 
 
 def load(filename: str | os.PathLike[str], node: str) -> tuple[str, dict[str, Any]]:
     """The name of a file, and the values under the node of that name in it."""
-    name = _file_name(filename)
-    try:
-        text = Path(name).read_text("utf-8")
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise error(f"cannot read {name!r}: {what}", cv2.Error.StsObjectNotFound) from reason
-    # OpenCV 4.8 does not survive all files that have lost their end.
-    if node not in text:
+    name = file_name(filename, "filename")
+    with opened(name) as (stream, size):
+        tree = parse(stream.read(size).decode("utf-8-sig"))
+    if not isinstance(tree, Mapping) or not isinstance(tree.get(node), Mapping):
         raise error(f"{name!r} holds no `{node}`", cv2.Error.StsParseError)
-    if _OPENING in text and _CLOSING not in text:
-        raise error(f"{name!r} is not complete", cv2.Error.StsParseError)
-    fs = cv2.FileStorage()
-    try:
-        fs.open(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-        found = fs.getNode(node)
-        whole = fs.getNode(_OPENING).empty() or fs.getNode(_CLOSING).real() == 1
-    except cv2.error as problem:
-        raise error(f"cannot read {name!r}: {problem.err}", cv2.Error.StsParseError) from problem
-    if not found.isMap():
-        raise error(f"{name!r} holds no `{node}`", cv2.Error.StsParseError)
-    if not whole:
+    if _OPENING in tree and tree.get(_CLOSING) != 1:
         raise error(f"{name!r} is not complete", cv2.Error.StsParseError)
     try:
-        return name, read(found)
+        return name, _checked({key: _tree_value(key, value) for key, value in tree[node].items()})
     except error as problem:
         raise error(f"{name!r}: {problem.err}", problem.code) from None
 
@@ -83,7 +68,10 @@ def write(fs: cv2.FileStorage, node: str, values: Mapping[str, Any]) -> None:
 
 def read(node: cv2.FileNode) -> dict[str, Any]:
     """The values under a node, in the types of Python."""
-    values = {name: _node_value(node.getNode(name)) for name in node.keys()}  # noqa: SIM118
+    return _checked({name: _node_value(node.getNode(name)) for name in node.keys()})  # noqa: SIM118
+
+
+def _checked(values: dict[str, Any]) -> dict[str, Any]:
     for name, option in DETECTION.items():  # a file storage knows no bool
         if isinstance(option.default, bool) and isinstance(values.get(name), int) and values[name] in (0, 1):
             values[name] = bool(values[name])
@@ -93,12 +81,6 @@ def read(node: cv2.FileNode) -> dict[str, Any]:
         except TypeError:
             raise fail("noise", "a number, an array, or what a NoiseModel holds", values["noise"]) from None
     return values
-
-
-def _file_name(filename: Any) -> str:
-    if not isinstance(filename, (str, os.PathLike)):
-        raise fail("filename", "a file name", type(filename).__name__)
-    return os.fsdecode(filename)
 
 
 def _write_node(fs: cv2.FileStorage, name: str, value: Any) -> None:
@@ -119,8 +101,29 @@ def _write_node(fs: cv2.FileStorage, name: str, value: Any) -> None:
         fs.write(name, float(value))
 
 
+def _tree_value(name: str, value: Any) -> Any:
+    """What `_write_node` has written, of nested dicts and lists."""
+    if isinstance(value, list):
+        return tuple(_tree_value(name, element) for element in value)
+    if not isinstance(value, Mapping):
+        return value
+    return _matrix(name, value) if "dt" in value else {key: _tree_value(key, own) for key, own in value.items()}
+
+
+def _matrix(name: str, parts: Mapping[str, Any]) -> np.ndarray:
+    """A matrix of one channel as cv2 writes it: rows and cols, or sizes, with type and data."""
+    try:
+        shape = np.ravel(parts["sizes"] if "sizes" in parts else (parts["rows"], parts["cols"])).tolist()
+        values = np.array(parts["data"], np.float64).ravel()
+        if min(shape, default=0) < 1:
+            raise ValueError(f"its size is {shape}")
+        return values.reshape(shape).astype(_TYPES[parts["dt"]])
+    except (KeyError, TypeError, ValueError, OverflowError) as reason:
+        raise error(f"`{name}` is a damaged matrix: {reason}", cv2.Error.StsParseError) from reason
+
+
 def _node_value(node: cv2.FileNode) -> Any:
-    """What `_write_node` has written, in the types of Python."""
+    """The same of nodes of a file storage."""
     if node.isInt():
         return int(node.real())
     if node.isReal():
@@ -130,9 +133,11 @@ def _node_value(node: cv2.FileNode) -> Any:
     if not node.isMap():
         return node.string() if node.isString() else None
     keys = node.keys()
-    if "dt" in keys:
-        try:
-            return node.mat()
-        except cv2.error as problem:
-            raise error(f"`{node.name()}` is a damaged matrix: {problem.err}", problem.code) from problem
-    return {key: _node_value(node.getNode(key)) for key in keys}
+    if "dt" not in keys:
+        return {key: _node_value(node.getNode(key)) for key in keys}
+    try:
+        if not {"data"} < set(keys) or not ({"rows", "cols"} <= set(keys) or "sizes" in keys):
+            raise error("it lacks its size or data")
+        return node.mat()
+    except cv2.error as problem:
+        raise error(f"`{node.name()}` is a damaged matrix: {problem.err}", problem.code) from problem

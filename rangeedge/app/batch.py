@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from .._check import boolean, described, error, fail, integer
 from .._option import parsed, takes
 from ..io import RangeImage, imreadRange
+from ..io.atomic import writing
 from ..io.source import file_name
 from ..options import DETECTION, LINKING, Growing, Linking, ScanLineParams, Selection
 from ..recording import FrameSource, framesOf
@@ -192,8 +192,9 @@ def runBatch(
     options |= {} if mask is None else {"mask": mask}
     told = {} if calibration is None else {"calibration": calibration}
     job = _FrameJob(root, options, told, task, form)
-    if root.exists() and not root.is_dir():
-        raise error(f"cannot write to {str(root)!r}: it is a file, no folder", cv2.Error.StsError)
+    with writing(root, "cannot write to"):
+        if root.exists() and not root.is_dir():
+            raise ValueError("it is a file, no folder")
     path = root.with_name(f"{root.name}.{_MANIFEST}") if form == "zarr" else root / _MANIFEST
     if resume and not path.exists():
         raise error(f"there is no {str(path)!r} to resume from")

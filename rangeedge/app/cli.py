@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from difflib import get_close_matches
@@ -18,9 +17,10 @@ from .._check import error, named
 from ..draw import drawEdges
 from ..frame import Frame
 from ..io import RangeImage
-from ..io.atomic import write_atomically
+from ..io.atomic import write_atomically, writing
 from ..io.lines import is_line_file, writeLines
 from ..options import CLEANING, DETECTION, GEOMETRY, Cleaning, Growing, Linking
+from . import streams
 from .batch import detect_file, read_image
 from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
 from .flags import add_detector, add_geometry, add_option, add_options, flag_of, pixel, reader
@@ -43,6 +43,7 @@ from .understood import in_flags, sentence, told_warnings
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; the result is the exit code: 0 done, 1 done in part, 2 a bad argument or input."""
+    streams.prepare()
     args = _arguments(argv)
     run: Callable[[argparse.Namespace], int] = args.run
     try:
@@ -56,10 +57,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # the reader of the output has had enough, as in `rangeedge bench | head -1`
-        _silence()
+        streams.silence()
         return 1
     except OSError as problem:  # what is found was written, what is said about it could not be
-        _silence()
+        streams.silence()
         print(f"rangeedge: error: cannot write what is to be said: {problem.strerror or problem}", file=sys.stderr)
         return 1
 
@@ -72,11 +73,6 @@ def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
         close = get_close_matches(unknown[0].partition("=")[0], flags, 1)
         args.parser.error(f"unknown argument {unknown[0]}{f'; did you mean {close[0]}?' if close else ''}")
     return args
-
-
-def _silence() -> None:
-    """Nothing more goes to the standard output, not even what is still on its way."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -285,7 +281,8 @@ def _explain(args: argparse.Namespace) -> int:
     image = read_image(args.image, _options(args))
     why = explainPixel(image.src, *args.at, **image.geometry)
     if args.out is not None:
-        write_atomically(args.out, encoded(".png", drawExplanation(why)))
+        with writing(args.out):
+            write_atomically(args.out, encoded(".png", drawExplanation(why)))
     print(in_flags(str(why), flag_of))
     return 0
 

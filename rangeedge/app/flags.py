@@ -12,6 +12,7 @@ import numpy as np
 
 from .._option import Option
 from ..detector import createScanLineDetector
+from ..io.source import opened
 from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing
 from .texts import GROUPS, PARAMS
 
@@ -22,7 +23,7 @@ def add_geometry(parser: argparse.ArgumentParser) -> None:
     projection = group.add_mutually_exclusive_group()
     for name, option in GEOMETRY.items():
         add_option(projection if name in ("K", "pixelSize") else group, option)
-    group.add_argument("--mask", type=_mask, metavar="FILE", help="8-bit image, not 0 where pixels are used")
+    group.add_argument("--mask", type=reader(_mask), metavar="FILE", help="8-bit image, not 0 where pixels are used")
     group.add_argument(
         "--calibration", type=int, choices=(1, 2), help="of an ABW scanner (default: by the file's name)"
     )
@@ -107,10 +108,10 @@ def pixel(text: str) -> tuple[int, int]:
 
 
 def _mask(text: str) -> np.ndarray:
-    try:
-        picture = cv2.imdecode(np.fromfile(text, np.uint8), cv2.IMREAD_UNCHANGED)
-    except (OSError, cv2.error) as reason:
-        raise argparse.ArgumentTypeError(f"cannot read {text!r}: {getattr(reason, 'strerror', reason)}") from None
+    """The 8-bit image of one channel that a file holds."""
+    with opened(text) as (stream, size):
+        data = np.frombuffer(stream.read(size), np.uint8)
+    picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     if picture is None or picture.dtype != np.uint8 or picture.ndim != 2:
-        raise argparse.ArgumentTypeError(f"must be an 8-bit image of one channel, {text!r} is none")
+        raise ValueError(f"must be an 8-bit image of one channel, {text!r} is none")
     return picture

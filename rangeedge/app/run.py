@@ -17,6 +17,7 @@ from .. import __version__
 from .._check import error
 from ..frames import outcomes_of
 from ..io import RangeImage
+from ..io.atomic import writing
 from ..plausible import collected
 from ..recording import FrameSource
 from ..recording.manifest import Line, Manifest, changed, complete
@@ -70,6 +71,7 @@ class Job:
         return (
             line is not None
             and line.get("state") == "written"
+            and isinstance(line.get("counts"), Mapping)
             and line.get("rangeedge") == __version__
             and (line.get("input"), line.get("part")) == (frame.path, frame.part)
             and line.get("modified") == changed(frame.path)
@@ -127,11 +129,12 @@ def run_frames(
 
 def _expect_apart(job: Job, frames: list[FrameSource]) -> None:
     """Refuse to write over what is read."""
-    inputs = {os.path.realpath(frame.path): frame.path for frame in frames}
-    for frame in frames:
-        place = os.path.realpath(job.place(frame))
-        if place in inputs:
-            raise error(f"results would replace the input {inputs[place]!r}; give another `out`")
+    with writing(job.out, "cannot write to"):
+        inputs = {os.path.realpath(frame.path): frame.path for frame in frames}
+        for frame in frames:
+            place = os.path.realpath(job.place(frame))
+            if place in inputs:
+                raise error(f"results would replace the input {inputs[place]!r}; give another `out`")
 
 
 def _sweep(out: Path) -> None:

@@ -15,7 +15,7 @@ from ..frame import checked
 from ..options import ScanLineParams
 from .arrays import read_npy, read_npz, write_npy, write_npz
 from .ascii_grid import is_ascii_grid, read_ascii_grid
-from .atomic import write_atomically
+from .atomic import write_atomically, writing
 from .exr import read_exr, write_exr
 from .pcd import is_pcd, read_pcd, write_pcd
 from .pictures import read_pfm, read_pgm, read_png, write_pfm, write_pgm, write_png
@@ -198,11 +198,8 @@ def imwriteRange(
         raise _check.fail("src", f"{reason} for {suffix}", _check.described(src)) from None
     except ImportError as reason:
         raise _check.error(f"cannot write {name!r}: {reason}") from reason
-    try:
+    with writing(name):
         write_atomically(name, data)
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise _check.error(f"cannot write {name!r}: {what}", cv2.Error.StsError) from reason
     return True
 
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 
 from .._check import array, described, error, fail, public
-from .atomic import write_atomically
+from .atomic import write_atomically, writing
 from .polylines import Line, toLines
-from .source import file_name
+from .source import file_name, opened
 
 
 class _Format(NamedTuple):
@@ -105,11 +104,8 @@ def writeLines(
         if value is not None and option not in _FORMATS[suffix].takes:
             raise fail(option, f"None for {suffix}", described(value))
     data = encoded_lines(suffix, lines, **options)
-    try:
+    with writing(name):
         write_atomically(name, data)
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise error(f"cannot write {name!r}: {what}", cv2.Error.StsError) from reason
 
 
 @public
@@ -150,14 +146,14 @@ def readLines(filename: str | os.PathLike[str]) -> list[Line]:
     """
     name = file_name(filename, "filename")
     suffix = _suffix(name, "read")
-    try:
-        return _FORMATS[suffix].function("read", suffix)(Path(name).read_bytes())
-    except OSError as reason:
-        raise error(f"cannot read {name!r}: {reason.strerror or reason}", cv2.Error.StsError) from reason
-    except (ValueError, KeyError, IndexError, TypeError, SyntaxError) as reason:
-        if isinstance(reason, error):
-            raise
-        raise error(f"cannot read {name!r}: it holds no lines ({reason})", cv2.Error.StsError) from reason
+    with opened(name) as (stream, size):
+        data = stream.read(size)
+        try:
+            return _FORMATS[suffix].function("read", suffix)(data)
+        except (ValueError, KeyError, IndexError, TypeError, SyntaxError, RecursionError) as reason:
+            if isinstance(reason, error):
+                raise
+            raise ValueError(f"it holds no lines ({reason})") from reason
 
 
 def encoded_lines(suffix: str, lines: Any, **options: Any) -> bytes:

@@ -139,11 +139,12 @@ def _named_apart(frames: list[FrameSource]) -> list[FrameSource]:
 
     The name of one is not that of the folder of others either, whose results would be among its own.
     """
-    places = Counter((os.path.abspath(frame.path), frame.part) for frame in frames)
+    paths = [_absolute(frame.path) for frame in frames]
+    places = Counter((path, frame.part) for path, frame in zip(paths, frames, strict=True))
     twice = next((path for (path, _), count in places.items() if count > 1), None)
     if twice is not None:
         raise error(f"{twice!r} is given twice")
-    folders = [Path(os.path.abspath(frame.path)).parent.parts[1:] for frame in frames]
+    folders = [Path(path).parent.parts[1:] for path in paths]
     beside = Counter((folder, frame.name) for folder, frame in zip(folders, frames, strict=True))
     above = {"/".join(parts[:end]) for parts in (f.name.split("/") for f in frames) for end in range(1, len(parts))}
     short = [
@@ -163,6 +164,13 @@ def _named_apart(frames: list[FrameSource]) -> list[FrameSource]:
         if not all(part.strip(".") for part in name.split("/")):
             raise error(f"{frame.title!r} has no name for a file of its results: {name!r}")
     return [replace(frame, name=name) for frame, name in zip(frames, names, strict=True)]
+
+
+def _absolute(path: str) -> str:
+    try:
+        return os.path.abspath(path)
+    except OSError as reason:  # the current folder has been removed
+        raise error(f"cannot read {path!r}: {reason.strerror}") from reason
 
 
 def _with_suffix(frame: FrameSource) -> str:

@@ -1,0 +1,291 @@
+"""Files, names, folders and streams that nobody means: one line says what is wrong, and nothing crashes."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+import rangeedge
+from rangeedge import createScanLineDetector
+from rangeedge.app.cli import main
+from rangeedge.batch import framesOf, runBatch
+
+ROOT = Path(rangeedge.__file__).parents[1]
+CAMERA = ["-K", "60,60,40,30"]
+OPTIONS = {"K": (60, 60, 40, 30)}
+
+
+@pytest.fixture
+def image(tmp_path):
+    depth = np.full((60, 80), 1500, np.uint16)
+    depth[20:40, 20:60] = 1200
+    path = tmp_path / "depth.png"
+    cv2.imwrite(str(path), depth)
+    return path
+
+
+def command(*arguments, first=":", redirection="", **more):
+    """What the command writes, as a process of its own: exit code, standard output and errors."""
+    line = f'{first}; exec "$0" -m rangeedge "$@" {redirection}'
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "OPENCV_FOR_THREADS_NUM": "1"} | more
+    run = subprocess.run(
+        ["sh", "-c", line, sys.executable, *map(os.fspath, arguments)],
+        capture_output=True,
+        env=environment,
+        timeout=120,
+    )
+    return run.returncode, run.stdout, run.stderr
+
+
+def code_of(*arguments):
+    """The exit code of the command."""
+    try:
+        return main(list(map(os.fspath, arguments)))
+    except SystemExit as end:
+        return end.code
+
+
+# Files of parameters
+
+
+@pytest.mark.parametrize(
+    ("suffix", "text"),
+    [
+        (".json", '{"ScanLineDetector":' * 100000 + "1" + "}" * 100000),
+        (".json", '{"ScanLineDetector": {"maxGap": ' + "[" * 100000 + "]" * 100000 + "}}"),
+        (".yml", "%YAML:1.0\n---\nScanLineDetector: " + "[" * 100000 + "]" * 100000),
+        (".yml", "%YAML:1.0\n---\nScanLineDetector:\n   " + "- " * 100000 + "1\n"),
+        (".xml", "<opencv_storage>" + "<ScanLineDetector>" * 100000 + "</ScanLineDetector>" * 100000),
+    ],
+    ids=["json maps", "json lists", "yaml brackets", "yaml dashes", "xml"],
+)
+def test_parameters_nested_without_end(tmp_path, suffix, text):
+    path = tmp_path / f"deep{suffix}"
+    path.write_text(text)
+    with pytest.raises(rangeedge.error, match=r"ScanLineDetector\.load: .*deep"):
+        createScanLineDetector().load(path)
+
+
+@pytest.mark.parametrize("key", ["rows", "cols", "data", "dt"])
+@pytest.mark.parametrize("suffix", ["yml", "json", "xml"])
+def test_matrices_that_lack_a_part(tmp_path, suffix, key):
+    detector, path = createScanLineDetector(), tmp_path / f"detector.{suffix}"
+    detector.setK((525, 525, 320, 240))
+    detector.save(path)
+    path.write_text(path.read_text().replace(key, f"x{key}"))
+    with pytest.raises(rangeedge.error, match="`K`"):
+        detector.load(path)
+    if suffix == "json" and key != "dt":
+        fs = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+        with pytest.raises(rangeedge.error, match="`K` is a damaged matrix"):
+            detector.read(fs.getNode("ScanLineDetector"))
+
+
+@pytest.mark.parametrize(
+    ("suffix", "text"),
+    [
+        (".json", '{"ScanLineDetector": {"maxGap": 3, "maxGap": 4}}'),
+        (".yml", "ScanLineDetector:\n  maxGap: 3\n  maxGap: 4\n"),
+        (".yml", "ScanLineDetector: {maxGap: 3, maxGap: 4}\n"),
+        (".xml", "<a><ScanLineDetector><maxGap>3</maxGap><maxGap>4</maxGap></ScanLineDetector></a>"),
+    ],
+)
+def test_a_parameter_given_twice(tmp_path, suffix, text):
+    path = tmp_path / f"twice{suffix}"
+    path.write_text(text)
+    with pytest.raises(rangeedge.error, match="maxGap"):
+        createScanLineDetector().load(path)
+
+
+def test_parameters_of_other_systems(tmp_path):
+    """With a mark of the byte order, and lines as Windows ends them."""
+    path = tmp_path / "detector.yml"
+    path.write_bytes(b"\xef\xbb\xbf%YAML:1.0\r\n---\r\nScanLineDetector:\r\n   maxGap: 4\r\n")
+    detector = createScanLineDetector()
+    detector.load(path)
+    assert detector.getMaxGap() == 4
+
+
+@pytest.mark.parametrize("what", ["--params", "--mask", "-K"])
+def test_named_pipes_are_not_waited_for(image, tmp_path, what, capsys):
+    os.mkfifo(tmp_path / "pipe.yml")
+    assert code_of("detect", image, what, tmp_path / "pipe.yml", "--out", tmp_path / "out") == 2
+    assert "it is a named pipe, not a file" in capsys.readouterr().err
+
+
+def test_lines_in_a_named_pipe(tmp_path):
+    os.mkfifo(tmp_path / "lines.csv")
+    with pytest.raises(rangeedge.error, match="it is a named pipe"):
+        rangeedge.readLines(tmp_path / "lines.csv")
+
+
+def test_lines_nested_without_end(tmp_path):
+    path = tmp_path / "deep.geojson"
+    path.write_text("[" * 100000)
+    with pytest.raises(rangeedge.error, match="it holds no lines"):
+        rangeedge.readLines(path)
+
+
+# Words of the command line
+
+
+@pytest.mark.parametrize("size", ["inf,inf", "nan,5", "1e400,1", "5", "0,0", "-1,5", "2.5,3", ""])
+def test_sizes_that_are_none(image, tmp_path, size, capsys):
+    assert code_of("detect", image, *CAMERA, f"--image-size={size}", "--out", tmp_path / "out") == 2
+    assert "must be" in capsys.readouterr().err
+
+
+# Folders and names
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("detect", "--out"),
+        ("segment", "--out"),
+        ("lines", "--out"),
+        ("batch", "--out"),
+        ("explain", "--at=5,5", "--out"),
+    ],
+    ids=lambda arguments: arguments[0],
+)
+@pytest.mark.parametrize("out", ["a" * 300, "depth.png/out"])
+def test_outputs_that_cannot_be_made(image, arguments, out, monkeypatch, capsys):
+    monkeypatch.chdir(image.parent)
+    assert main([arguments[0], "depth.png", *CAMERA, *arguments[1:], out]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert "cannot write" in told
+    assert os.listdir() == ["depth.png"]
+
+
+@pytest.mark.parametrize("name", ["detect", "segment", "lines", "batch"])
+def test_the_current_folder_is_gone(image, name):
+    gone = f"mkdir '{image.parent}/gone' && cd '{image.parent}/gone' && rmdir ../gone"
+    code, _, told = command(name, image, *CAMERA, "--out", "out", first=gone)
+    assert code == 2
+    assert told.startswith(b"rangeedge: error:")
+    assert b"cannot write to 'out'" in told
+
+
+@pytest.mark.parametrize("make", [os.mkdir, os.mkfifo], ids=["folder", "pipe"])
+def test_a_manifest_that_is_none(image, tmp_path, make):
+    out = tmp_path / "out"
+    out.mkdir()
+    make(out / "manifest.jsonl")
+    with pytest.raises(rangeedge.error, match=r"cannot read .*manifest\.jsonl"):
+        list(runBatch(image, out, **OPTIONS))
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        '{"frame": "other", "seconds": NaN}',
+        '{"frame": "other", "seconds": 1e999}',
+        '{"frame": "other", "x": ' + "[" * 100000,
+        '{"frame": {}}',
+        "[]",
+        "3",
+        '{"frame": "other", "x": ' + "1" * 10000 + "}",
+    ],
+    ids=lambda line: line[:24],
+)
+def test_lines_of_a_manifest_that_others_wrote(image, tmp_path, line):
+    out = tmp_path / "out"
+    assert [item.state for item in runBatch(image, out, **OPTIONS)] == ["written"]
+    manifest = out / "manifest.jsonl"
+    manifest.write_text(f"{line}\n{manifest.read_text()}{line}\n")
+    assert [item.state for item in runBatch(image, out, **OPTIONS)] == ["skipped"]
+    assert [json.loads(line)["frame"] for line in manifest.read_text().splitlines()] == ["depth"]
+
+
+@pytest.mark.parametrize("change", [{"outputs": {}}, {"seconds": float("inf")}, {"counts": None}])
+def test_a_line_that_was_edited_is_done_again(image, tmp_path, change):
+    out = tmp_path / "out"
+    list(runBatch(image, out, **OPTIONS))
+    manifest = out / "manifest.jsonl"
+    manifest.write_text(json.dumps(json.loads(manifest.read_text()) | change) + "\n")
+    assert [item.state for item in runBatch(image, out, **OPTIONS)] == ["written"]
+
+
+# Streams
+
+
+@pytest.mark.parametrize("redirection", [">&-", "2>&-", ">&- 2>&-", "<&-"])
+@pytest.mark.parametrize("name", ["detect", "batch"])
+def test_closed_streams(image, tmp_path, name, redirection):
+    out = tmp_path / "out"
+    code, _, told = command(name, image, *CAMERA, "--out", out, redirection=redirection)
+    assert (code, told) == (0, b"")
+    assert list(out.rglob("report.json"))
+
+
+@pytest.mark.parametrize("name", ["detect", "segment", "lines", "batch", "explain"])
+@pytest.mark.parametrize("encoding", ["utf-8", "ascii", "latin-1"])
+def test_names_that_the_output_cannot_take(image, name, encoding):
+    odd = os.fsencode(image.parent) + b"/caf\xe9 \xe2\x82\xac.png"
+    os.rename(image, odd)
+    more = ["--at", "5,5"] if name == "explain" else []
+    out = image.parent / ("out.png" if name == "explain" else "out")
+    code, said, told = command(name, os.fsdecode(odd), *CAMERA, *more, "--out", out, PYTHONIOENCODING=encoding)
+    assert (code, told) == (0, b"")
+    assert said
+
+
+def test_the_program_keeps_its_own_streams(image, tmp_path, monkeypatch):
+    """A stream that is no file of Python's is written to as it is."""
+
+    class Own:
+        errors = "strict"
+
+        def __init__(self):
+            self.text = ""
+
+        def write(self, text):
+            self.text += text
+
+        def flush(self):
+            pass
+
+    own = Own()
+    monkeypatch.setattr(sys, "stdout", own)
+    assert main(["detect", str(image), *CAMERA, "--out", str(tmp_path / "out")]) == 0
+    assert "edge pixels" in own.text
+
+
+# Arrays of others
+
+
+class OfAnotherDevice:
+    def __dlpack__(self, **_):
+        raise AttributeError("no memory of the CPU")
+
+
+@pytest.mark.parametrize("src", [cv2.UMat(), OfAnotherDevice()], ids=["UMat", "DLPack"])
+def test_images_without_memory(src):
+    with pytest.raises(rangeedge.error, match="`src` must be"):
+        rangeedge.detectEdges(src)
+
+
+class NoPath(os.PathLike):
+    def __fspath__(self):
+        return 5
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda: rangeedge.detectEdges(np.ones((8, 8)), K=NoPath()),
+        lambda: createScanLineDetector().save(NoPath()),
+        lambda: createScanLineDetector().load(NoPath()),
+        lambda: framesOf([NoPath()]),
+    ],
+)
+def test_paths_that_are_none(call):
+    with pytest.raises(rangeedge.error, match="must be a file name"):
+        call()
