@@ -67,7 +67,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     """The arguments; of a flag that there is not, the command's flag most like it is named."""
-    args, unknown = _parser().parse_known_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    parser = _parser()
+    for word in words:
+        if word.startswith("--") and word.endswith("=--"):  # argparse makes an empty list of that
+            parser.error(f"argument {word.removesuffix('=--')}: expected one argument")
+    args, unknown = parser.parse_known_args(words)
     if unknown:
         flags = [flag for action in args.parser._actions for flag in action.option_strings]
         close = get_close_matches(unknown[0].partition("=")[0], flags, 1)
