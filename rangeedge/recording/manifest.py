@@ -20,6 +20,7 @@ from ..io.atomic import write_atomically, writing
 from ..io.source import opened
 
 Line = dict[str, Any]
+MANIFEST = "manifest.jsonl"
 
 
 def read_lines(path: Path) -> dict[str, Line]:
@@ -98,12 +99,13 @@ def _encoded(line: Mapping[str, Any]) -> bytes:
     return json.dumps(line, allow_nan=False).encode() + b"\n"
 
 
-def changed(path: str) -> int | None:
-    """When a file was changed, in nanoseconds."""
+def state_of(path: str) -> Line:
+    """What tells whether a file was changed: its time in nanoseconds, and its size in bytes."""
     try:
-        return os.stat(path).st_mtime_ns
-    except OSError:
-        return None
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return {"modified": None, "bytes": None}
+    return {"modified": found.st_mtime_ns, "bytes": found.st_size}
 
 
 def complete(root: Path, line: Line) -> bool:
