@@ -100,7 +100,7 @@ def array(name: str, value: Any, expected: str, ndim: Collection[int] = (2,)) ->
         limit = f"2^{PIXEL_LIMIT.bit_length() - 1}"
         expected = f"{expected} of fewer than {limit} pixels, a margin of one included (runBlocks takes larger images)"
         raise fail(name, expected, described(value), cv2.Error.StsBadSize)
-    return value
+    return np.asarray(value)  # np.matrix and the like have ways of their own
 
 
 def image8(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
@@ -210,11 +210,19 @@ def camera_file(name: str, path: str | os.PathLike[str]) -> Camera:
         raise fail(name, "a camera or the name of a file of one", f"{path!r} ({what})") from None
 
 
+def reals(value: Any) -> np.ndarray:
+    """Numbers in any form as an array of float64; complex ones are refused, whose imaginary part would be lost."""
+    numbers = np.array(value)
+    if numbers.dtype.kind == "c":
+        raise ValueError("complex numbers")
+    return numbers.astype(np.float64)
+
+
 def distortion(name: str, value: Any) -> np.ndarray:
     """Coefficients of distortion as float64, as many as cv2 knows."""
     expected = "4, 5, 8, 12 or 14 finite numbers"
     try:
-        coefficients = np.array(value, dtype=np.float64).ravel()
+        coefficients = reals(value).ravel()
     except (TypeError, ValueError, OverflowError):
         raise fail(name, expected, described(value)) from None
     if len(coefficients) not in (4, 5, 8, 12, 14) or not np.isfinite(coefficients).all():

@@ -354,3 +354,40 @@ def test_a_file_that_was_replaced_by_an_older_one(tmp_path, suffix):
     list(runBatch(path, out, **options))
     assert store(1600, 2) == 1600
     assert {item.state for item in runBatch(path, out, **options)} == {"written"}
+
+
+@pytest.mark.filterwarnings("ignore::PendingDeprecationWarning")
+@pytest.mark.parametrize("kind", [np.matrix, np.recarray, np.memmap])
+def test_arrays_of_other_classes(kind):
+    """A row of np.matrix has two axes, and its product is that of matrices."""
+    depth = np.where(np.arange(60) < 30, 1.0, 2.0) + np.random.default_rng(0).normal(0, 0.001, (40, 60))
+    noise = np.full((40, 60), 0.001)
+    of_class = depth.view(kind)
+    for function in (rangeedge.edgeStrength, rangeedge.cleanDepth, rangeedge.segmentRegionsWithStats):
+        for one, other in zip(function(of_class, noise=noise.view(kind)), function(depth, noise=noise), strict=True):
+            np.testing.assert_array_equal(one, other)
+            assert type(one) is type(other)
+    flying = rangeedge.flyingPixels(of_class)
+    np.testing.assert_array_equal(flying, rangeedge.flyingPixels(depth))
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda z: rangeedge.detectEdges(z, K=np.array([60, 60, 30, 20j])),
+        lambda z: rangeedge.detectEdges(z, K=(60, 60, 30, 20), distCoeffs=[0.1j, 0, 0, 0]),
+        lambda z: rangeedge.sweepToPoints(z, elevation=np.full(40, 1j), azimuth=np.arange(60)),
+        lambda z: rangeedge.synthetic.cylinder((0, 0, 1j), (0, 0, 1), 1, 1),
+        lambda z: rangeedge.writeLines("x.geojson", rangeedge.linkEdges(z), transform=[1j] * 6),
+    ],
+)
+def test_complex_numbers_are_no_lengths(call):
+    with pytest.raises(rangeedge.error, match=r"`.*` must be"):
+        call(np.ones((40, 60)))
+
+
+@pytest.mark.parametrize("name", ["K", "distCoeffs"])
+def test_complex_numbers_in_a_file(tmp_path, name):
+    np.savez(tmp_path / "a.npz", src=np.ones((4, 5)), **{"K": np.array([60, 60, 2, 2]), name: np.full(4, 1j)})
+    with pytest.raises(rangeedge.error, match="complex"):
+        rangeedge.imreadRange(tmp_path / "a.npz")

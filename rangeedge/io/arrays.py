@@ -9,6 +9,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from .._check import reals
 from .range_image import RangeImage
 from .source import FILE_LIMIT, expect_size, expect_unpacked
 
@@ -96,8 +97,8 @@ def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, limit: int) -> np
 
 # What an array in an NPZ file stands for.
 _GEOMETRY: dict[str, Callable[[np.ndarray], Any]] = {
-    "K": lambda value: np.array(value, dtype=np.float64),
-    "distCoeffs": lambda value: np.array(value, dtype=np.float64),
+    "K": reals,
+    "distCoeffs": reals,
     "pixelSize": lambda value: tuple(np.broadcast_to(value.astype(np.float64), 2).tolist()),
     "heightMap": lambda value: bool(value.item()),
     "depthFactor": lambda value: float(value.item()),

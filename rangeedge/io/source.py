@@ -43,7 +43,7 @@ def file_name(path: Any, argument: str = "path") -> str:
     if not name:
         got = type(path).__name__ if name is None else repr(name)
         raise _check.fail(argument, "a file name (str or path)", got)
-    return os.fsdecode(name)
+    return str(os.fsdecode(name))
 
 
 @contextmanager
