@@ -298,8 +298,8 @@ def test_paths_that_are_none(call):
         ({"topics": 5}, "`topics` must be an iterable"),
         ({"topics": "camera"}, "`topics` must be an iterable"),
         ({"topics": [5]}, "`topics` must be an iterable"),
-        ({"out": ""}, "`out` must be a file name"),
-        ({"inputs": ""}, "`inputs` must be a file name"),
+        ({"out": ""}, "`out` must be the name of a folder"),
+        ({"inputs": ""}, "`inputs` must be names of files"),
     ],
 )
 def test_arguments_of_a_run_that_are_none(image, tmp_path, arguments, message):

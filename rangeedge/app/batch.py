@@ -20,7 +20,7 @@ from ..recording import FrameSource, framesOf
 from ..recording.manifest import MANIFEST, Line, Manifest
 from ..recording.stores import FORMS, Outputs, packed, prepare_zarr, write_chunks, write_file
 from .results import EdgeResults, edge_files, encoded, find_edges, write_folder
-from .run import BatchItem, Job, run_frames
+from .run import BatchItem, Job, root_of, run_frames
 from .tasks import TASKS, Counts, picture_of
 
 
@@ -173,7 +173,7 @@ def runBatch(
     >>> sorted(os.listdir(os.path.join(out, "walk")))
     ['0000.png', '0001.png']
     """
-    root = Path(file_name(out, "out"))
+    root = root_of(out)
     if not isinstance(task, str) or task not in TASKS:
         raise fail("task", " or ".join(map(repr, TASKS)), described(task))
     form = form or ("zarr" if root.suffix == ".zarr" else "folder")

@@ -27,7 +27,7 @@ from ..recording.stores import Outputs, open_arrays, packed, prepare_arrays, wri
 from ..regions import segmentRegions
 from ..selection import overallStrength
 from .results import plain
-from .run import BatchItem, Job, run_frames
+from .run import BatchItem, Job, root_of, run_frames
 from .tasks import TASKS, Counts
 
 _REACH = 4096  # pixels around a block in which the nearest edge is looked for
@@ -113,7 +113,7 @@ def runBlocks(
     >>> if find_spec("zarr"):
     ...     items = list(runBlocks(path, path + ".zarr", blockSize=128, overlap=32, noise=0.01, heightMap=True))
     """
-    name, root = file_name(image, "image"), Path(file_name(out, "out"))
+    name, root = file_name(image, "image"), root_of(out)
     if not isinstance(task, str) or task not in _PASSES:
         raise fail("task", " or ".join(map(repr, _PASSES)), described(task))
     folder = None if root.suffix == ".zarr" else root

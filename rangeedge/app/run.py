@@ -14,9 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import __version__
-from .._check import error
+from .._check import error, fail
 from ..frames import outcomes_of
 from ..io import RangeImage
+from ..io.source import file_name
 from ..plausible import collected
 from ..recording import FrameSource
 from ..recording.manifest import Line, Manifest, complete, state_of
@@ -24,6 +25,14 @@ from .results import plain
 from .tasks import Counts
 
 _STAGE = re.compile(r"\.[0-9a-f]{32}\.tmp")  # what a run that was killed may leave behind
+
+
+def root_of(out: str | os.PathLike[str]) -> Path:
+    """Where results go; no name is not the current folder."""
+    name = file_name(out, "out")
+    if not name:
+        raise fail("out", "the name of a folder or of a store", repr(name))
+    return Path(name)
 
 
 class BatchItem(NamedTuple):

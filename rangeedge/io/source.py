@@ -40,9 +40,8 @@ def file_name(path: Any, argument: str = "path") -> str:
         name = os.fspath(path) if isinstance(path, (str, os.PathLike)) else None
     except TypeError:  # from a path that returns no name
         name = None
-    if not name:
-        got = type(path).__name__ if name is None else repr(name)
-        raise _check.fail(argument, "a file name (str or path)", got)
+    if name is None:
+        raise _check.fail(argument, "a file name (str or path)", type(path).__name__)
     return str(os.fsdecode(name))
 
 
