@@ -196,8 +196,7 @@ def checked(src: np.ndarray, params: ScanLineParams) -> tuple[np.ndarray, np.nda
         raise fail("distCoeffs", "None where K is not given", described(params.distCoeffs))
     if K is None and params.imageSize is not None:
         raise fail("imageSize", "None where K is not given", described(params.imageSize))
-    if params.imageSize is not None and params.imageSize != (src.shape[1], src.shape[0]):
-        raise _other_size(src.shape, params.imageSize)
+    expect_size(src.shape, params.imageSize)
     for name in ("K", "pixelSize") if points else ("origin",):
         if getattr(params, name) is not None:
             form = "points" if points else "no points"
@@ -207,11 +206,14 @@ def checked(src: np.ndarray, params: ScanLineParams) -> tuple[np.ndarray, np.nda
     return src, seen
 
 
-def _other_size(shape: tuple[int, ...], size: tuple[int, int]) -> Exception:
-    """What to say of an image that K does not hold for."""
-    (width, height), (own_width, own_height) = size, (shape[1], shape[0])
+def expect_size(shape: tuple[int, ...], size: tuple[int, int] | None) -> None:
+    """Refuse an image that K does not hold for."""
+    own_width, own_height = shape[1], shape[0]
+    if size is None or size == (own_width, own_height):
+        return
+    width, height = size
     x, y = own_width / width, own_height / height
-    return error(
+    raise error(
         f"`src` has {own_width} x {own_height} pixels, but K holds for {width} x {height}: where the image was resized,"
         f" give (x fx, y fy, x (cx + 0.5) - 0.5, y (cy + 0.5) - 0.5) with x = {x:.6g} and y = {y:.6g}; where it was"
         " cropped, subtract its first column and row from cx and cy; or say by imageSize what K holds for",

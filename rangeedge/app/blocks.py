@@ -13,6 +13,7 @@ import numpy as np
 from .._check import boolean, described, error, fail, integer, number
 from .._option import parsed, takes
 from ..distance import distanceTransform, salienceDistanceTransform
+from ..frame import expect_size
 from ..io import RangeImage
 from ..io.source import file_name
 from ..io.tiff import Window
@@ -21,7 +22,7 @@ from ..options import DETECTION, MEASURED, Growing, ScanLineParams, Selection
 from ..recording import FrameSource
 from ..recording.blocks import Grid, clearance, inside, joined, matches
 from ..recording.large import LargeImage, open_large, window_source, write_geotiff
-from ..recording.manifest import Manifest, read_lines
+from ..recording.manifest import Line, Manifest, read_lines
 from ..recording.source import extra
 from ..recording.stores import Outputs, open_arrays, packed, prepare_arrays, write_file, write_region
 from ..regions import segmentRegions
@@ -131,7 +132,10 @@ def runBlocks(
     maps = {} if mask is None else {"mask": mask}
     if isinstance(options.get("noise"), np.ndarray) and options["noise"].ndim:
         maps["noise"] = options.pop("noise")
-    parsed(options, ScanLineParams, Selection, Growing)
+    params, *_ = parsed(options, ScanLineParams, Selection, Growing)
+    if params.imageSize is not None:  # of the whole image, of which blocks are parts
+        expect_size(large.shape, params.imageSize)
+        options |= {"K": params.K, "distCoeffs": params.distCoeffs, "imageSize": None}
     for what, values in maps.items():
         if not isinstance(values, np.ndarray) or values.shape != large.shape:
             raise fail(what, f"an array of shape {large.shape}", described(values))
@@ -249,6 +253,9 @@ class _BlockJob(Job):
         arrays = {name: (kind, self.grid.shape, (size, size)) for name, kind in self.kinds.items()}
         prepare_arrays(self.out, arrays, fresh)
         open_arrays(self.out).attrs.update(plain(self.map))
+
+    def is_done(self, index: int, frame: FrameSource, lines: Mapping[str, Line]) -> bool:
+        return lines.get(frame.name, {}).get("index") == index and super().is_done(index, frame, lines)
 
     def parameters(self, frame: FrameSource) -> dict[str, Any]:
         return {**super().parameters(frame), **plain(_maps_of(frame))}

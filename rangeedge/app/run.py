@@ -79,7 +79,7 @@ class Job:
         return (
             line is not None
             and line.get("state") == "written"
-            and isinstance(line.get("counts"), Mapping)
+            and _are_counts(line.get("counts"))
             and line.get("rangeedge") == __version__
             and (line.get("input"), line.get("part")) == (frame.path, frame.part)
             and state_of(frame.path).items() <= line.items()
@@ -133,6 +133,10 @@ def run_frames(
             yield BatchItem(frame.title, where, line["state"], outcome.error, warnings)
             if outcome.full:
                 raise error(f"nothing more can be written to {str(job.out)!r}; make room, and run it again")
+
+
+def _are_counts(counts: Any) -> bool:
+    return isinstance(counts, Mapping) and all(type(count) is int for count in counts.values())
 
 
 def _expect_apart(job: Job, frames: list[FrameSource]) -> None:

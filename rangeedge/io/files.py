@@ -190,7 +190,7 @@ def imwriteRange(
         raise _check.fail("path", f"a file name with one of the suffixes {' '.join(_WRITERS)}", repr(name))
     if given and suffix != ".npz":
         raise _check.fail(next(iter(given)), f"None for {suffix} (only .npz holds a geometry)", "a value")
-    if need := _unfit(src):
+    if need := unfit(src):
         raise _check.fail("src", need, _check.described(src), cv2.Error.StsUnsupportedFormat)
     try:
         data = _WRITERS[suffix](_native(src), **given)
@@ -207,7 +207,7 @@ def as_range_image(array: np.ndarray) -> np.ndarray:
     """What a file holds as a range image of our own; a third axis of length 1 is dropped."""
     if array.ndim == 3 and array.shape[2] == 1:
         array = array[..., 0]
-    if need := _unfit(array):
+    if need := unfit(array):
         raise ValueError(f"it holds an {_check.described(array)}, no range image, which is {need}")
     return _native(array)
 
@@ -217,7 +217,7 @@ def _native(array: np.ndarray) -> np.ndarray:
     return np.require(array, array.dtype.newbyteorder("="), ["C", "W", "A"])
 
 
-def _unfit(array: np.ndarray) -> str | None:
+def unfit(array: np.ndarray) -> str | None:
     """What a range image would be, where `array` is none."""
     integer, real = array.dtype.kind in "ui", array.dtype.kind == "f"
     if array.size == 0:
