@@ -18,6 +18,7 @@ from .plausible import warn_of_dropped
 from .sectors import Turn, turn_of
 from .viewpoint import distorted_rays, view_of
 
+_DIGITS = 53  # of double precision, binary
 _THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
 
 
@@ -172,6 +173,7 @@ def read_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None 
         if found.any():
             seen = ~found if seen is None else seen & ~found
     _core.checkpoint()
+    _expect_exact(src, seen)
     if src.ndim == 3:
         return _points(src, seen, params)
     if params.K is not None:
@@ -242,6 +244,21 @@ def _lengths(src: np.ndarray, depthFactor: float, heightMap: bool = False) -> np
     lengths = np.divide(src, real(depthFactor), dtype=real, order="C")
     lengths[src <= (np.iinfo(src.dtype).min if heightMap else 0)] = np.nan
     return lengths
+
+
+def _expect_exact(src: np.ndarray, seen: np.ndarray | None) -> None:
+    """Refuse integers that double precision would round; the least of the type stands for no data."""
+    if src.dtype.kind not in "iu" or src.dtype.itemsize < 8:
+        return
+    rounded = src > 2**_DIGITS
+    if src.dtype.kind == "i":
+        rounded |= (src < -(2**_DIGITS)) & (src > np.iinfo(src.dtype).min)
+    if (rounded if seen is None else rounded & seen).any():
+        raise error(
+            f"`src` holds integers beyond 2^{_DIGITS}, which double precision rounds: subtract what they share, or"
+            " say by invalid which of them stand for no data",
+            cv2.Error.StsOutOfRange,
+        )
 
 
 def _step(src: np.ndarray, depthFactor: float) -> float:

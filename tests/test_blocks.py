@@ -332,6 +332,14 @@ def test_what_is_no_large_image(zarr, tmp_path):
             runBlocks(tmp_path / name, tmp_path / "out.zarr")
 
 
+def test_no_more_blocks_than_can_be_listed(zarr, tmp_path, monkeypatch):
+    np.save(tmp_path / "a.npy", np.zeros((640, 1280)))
+    monkeypatch.setattr("rangeedge.app.blocks._MOST_BLOCKS", 199)
+    with pytest.raises(error, match="`blockSize` must be such that 1280 x 640 pixels are at most 199 blocks, got 64"):
+        runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", blockSize=64)
+    runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", blockSize=72)
+
+
 def test_a_camera_of_a_size_is_that_of_the_whole_image(zarr, tmp_path):
     """Given by hand or by a file; blocks, and patches of which noise is estimated, are of other sizes."""
     depth = np.where(np.arange(320) < 150, 1.0, 1.5) + np.random.default_rng(0).normal(0, 0.001, (200, 320))

@@ -391,3 +391,25 @@ def test_complex_numbers_in_a_file(tmp_path, name):
     np.savez(tmp_path / "a.npz", src=np.ones((4, 5)), **{"K": np.array([60, 60, 2, 2]), name: np.full(4, 1j)})
     with pytest.raises(rangeedge.error, match="complex"):
         rangeedge.imreadRange(tmp_path / "a.npz")
+
+
+@pytest.mark.parametrize("heightMap", [False, True])
+@pytest.mark.parametrize("dtype", [np.int64, np.uint64])
+def test_integers_that_double_precision_would_round(dtype, heightMap):
+    """Steps of 1 are lost beyond 2^53: no edges would be found, in silence."""
+    options = {"depthFactor": 1.0, "noise": 0.1, "heightMap": heightMap}
+    step = np.where(np.arange(60) < 30, 1000, 1004) * np.ones((40, 1), dtype)
+    expected = rangeedge.detectEdges(step, **options)
+    assert expected.any()
+    for offset in (0, 2**53 - 1004, -(2**53) - 1000 if heightMap and dtype == np.int64 else 0):
+        moved = (step.astype(object) + offset).astype(dtype)
+        np.testing.assert_array_equal(rangeedge.detectEdges(moved, **options), expected)
+    for offset in (2**53 - 1000, 2**62, -(2**53) - 1004 if heightMap and dtype == np.int64 else 2**62):
+        moved = (step.astype(object) + offset).astype(dtype)
+        with pytest.raises(rangeedge.error, match=r"integers beyond 2\^53.*subtract"):
+            rangeedge.detectEdges(moved, **options)
+    marked = step.copy()
+    marked[:3] = np.iinfo(dtype).max
+    without = rangeedge.detectEdges(step, mask=marked < 2000, **options)
+    for invalid in (float(np.iinfo(dtype).max), [(5000, np.inf)]):
+        np.testing.assert_array_equal(rangeedge.detectEdges(marked, invalid=invalid, **options), without)

@@ -36,6 +36,7 @@ _SALIENCE_REACH = 1024  # the same where weak edges count for less: distances by
 _STRIP = 32  # pixels across a seam in which labels of both sides are compared
 _PATCHES = 16  # of the image, of which the noise is estimated
 _PATCH = 512  # pixels
+_MOST_BLOCKS = 2**20
 
 
 @takes({**DETECTION, **Growing.options})
@@ -143,6 +144,9 @@ def runBlocks(
     if resume and not first.exists():
         raise error(f"there is no {str(first)!r} to resume from")
     grid = Grid(large.shape, size)
+    if len(grid) > _MOST_BLOCKS:
+        rows, cols = large.shape
+        raise fail("blockSize", f"such that {cols} x {rows} pixels are at most {_MOST_BLOCKS} blocks", size)
     steps = _PASSES[task] if jumpCut is None else (*_PASSES[task], "salience")
     items = _passes(steps, large, grid, root, overlap, options, maps, jumpCut, force, jobs=jobs, client=client)
     return items if folder is None else _and_files(items, steps, large, grid, root)

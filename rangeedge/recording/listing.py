@@ -117,7 +117,8 @@ def _frames(path: str, topics: tuple[str, ...], options: dict[str, Any]) -> list
             raise
         if topics and bag:
             raise
-        return [FrameSource(_stem(path), path, "", Unreadable(str(getattr(problem, "err", problem))))]
+        reason = problem.err if isinstance(problem, error) else f"cannot read {path!r}: {problem}"
+        return [FrameSource(_stem(path), path, "", Unreadable(reason))]
     return found or [file_frame(path, _stem(path), **options)]
 
 

@@ -14,14 +14,14 @@ import numpy as np
 from ..io import RangeImage
 from ..io.arrays import source_name
 from ..io.files import as_range_image
-from ..io.source import opened
+from ..io.source import FILE_LIMIT, expect_pixels, opened
 from ..io.tiff import images_of_tiff, read_page
 from ..io.tiff_tags import Page
 from .archives import npz_stack
 from .source import FrameSource, extra, failures_named, kept
 
 _TIFF_HEADS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_PAGES = 2**20
+_FRAMES = 2**20  # of a file
 _GEOMETRY = ("K", "distCoeffs", "pixelSize", "heightMap", "depthFactor")
 
 
@@ -65,6 +65,9 @@ def stack_frames(path: str) -> list[FrameSource]:
 def _frames(shape: tuple[int, ...], dtype: np.dtype) -> int:
     """How many frames an array of this shape holds; 0 where it is one range image."""
     if len(shape) == 4 or (len(shape) == 3 and not (dtype.kind == "f" and shape[2] in (1, 3, 4))):
+        expect_pixels(*shape[1:3])
+        if shape[0] > _FRAMES:
+            raise ValueError(f"it holds {shape[0]} frames, more than the {_FRAMES} that are listed")
         return shape[0]
     return 0
 
@@ -93,7 +96,7 @@ def _npz_frame(path: str, index: int) -> RangeImage:
 @kept(4)
 def _pages(path: str) -> list[Page]:
     with opened(path, math.inf) as (stream, _):
-        return images_of_tiff(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ), _PAGES)  # type: ignore[arg-type]
+        return images_of_tiff(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ), _FRAMES)  # type: ignore[arg-type]
 
 
 def _tiff_frame(path: str, index: int) -> RangeImage:
@@ -115,6 +118,8 @@ def zarr_array(path: str) -> tuple[Any, Mapping[str, Any]]:
         if hasattr(found, "array_keys"):
             found = found[source_name(sorted(found.array_keys()))]
             attributes |= dict(found.attrs)
+        if (size := math.prod(found.chunks) * found.dtype.itemsize) > FILE_LIMIT:
+            raise ValueError(f"its chunks have {size} bytes each, more than the {FILE_LIMIT} that are unpacked")
         return found, {key: attributes[key] for key in _GEOMETRY if key in attributes}
 
 
