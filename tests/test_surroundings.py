@@ -413,3 +413,26 @@ def test_integers_that_double_precision_would_round(dtype, heightMap):
     without = rangeedge.detectEdges(step, mask=marked < 2000, **options)
     for invalid in (float(np.iinfo(dtype).max), [(5000, np.inf)]):
         np.testing.assert_array_equal(rangeedge.detectEdges(marked, invalid=invalid, **options), without)
+
+
+def test_other_interpreters_of_a_process_are_refused():
+    """Where the first interpreter has not imported it either; the process ends as it should."""
+    program = """
+import warnings
+try:
+    import _interpreters as interpreters
+except ImportError:
+    import _xxsubinterpreters as interpreters
+warnings.simplefilter("ignore")
+other = interpreters.create()
+told = None
+try:
+    told = interpreters.run_string(other, "import warnings; warnings.simplefilter('ignore'); import rangeedge._core")
+except Exception as refused:
+    told = refused
+print(told)
+"""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment, timeout=120)
+    assert (run.returncode, run.stderr) == (0, "")
+    assert "interpreter" in run.stdout
