@@ -16,7 +16,7 @@ import pytest
 
 import rangeedge
 from rangeedge.app.cli import main
-from rangeedge.explorer.guard import Guard
+from rangeedge.explorer.guard import Guard, expect_free
 from rangeedge.explorer.session import SLIDERS, SWITCHES, VIEWS, Session
 from rangeedge.options import DETECTION
 
@@ -157,6 +157,29 @@ def test_uploads_of_any_name(session, name, monkeypatch):
 def test_who_may_ask(host, headers, status):
     refusal = Guard(None, host).refusal([(name.encode(), value.encode()) for name, value in headers.items()])
     assert (refusal and refusal[0]) == status
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "message"),
+    [
+        ("127.0.0.1", -1, "`port` must be an integer from 1 to 65535, got -1"),
+        ("127.0.0.1", 99999, "`port` must be an integer from 1 to 65535, got 99999"),
+        ("300.1.1.1", 8321, r"cannot listen at '300\.1\.1\.1', port 8321: "),
+        ("a\0b", 8321, "cannot listen at"),
+        ("x" * 300, 8321, "cannot listen at"),
+    ],
+)
+def test_addresses_that_are_none(host, port, message):
+    with pytest.raises(rangeedge.error, match=message):
+        expect_free(host, port)
+
+
+def test_a_port_that_is_taken():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(rangeedge.error, match=f"port {port}: Address already in use"):
+            expect_free("127.0.0.1", port)
+    expect_free("127.0.0.1", port)
 
 
 def test_geometry_as_typed(session):

@@ -1,11 +1,16 @@
-"""Who may use the page: the page itself. What another page in the same browser asks is refused."""
+"""Where the page is, and who may use it: the page itself. What another page in the same browser asks is refused."""
 
 from __future__ import annotations
 
 import ipaddress
+import socket
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 from urllib.parse import urlsplit
+
+import cv2
+
+from .._check import error, integer
 
 Message = MutableMapping[str, Any]
 Application = Callable[
@@ -14,6 +19,18 @@ Application = Callable[
 
 LARGEST_UPLOAD = 200_000_000  # bytes
 _AROUND = 100_000  # bytes that go with an upload
+
+
+def expect_free(host: str, port: int) -> None:
+    """Refuse an address at which nothing can be served."""
+    integer("port", port, 1, 65535)
+    try:
+        with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as probe:
+            probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            probe.bind((host, port))
+    except (OSError, ValueError, TypeError) as reason:  # of names that are none
+        why = getattr(reason, "strerror", None) or reason
+        raise error(f"cannot listen at {host!r}, port {port}: {why}", cv2.Error.StsError) from reason
 
 
 class Guard:

@@ -18,7 +18,7 @@ from ..cancellation import Cancellation
 from ..draw import drawExplanation
 from ..draw.palette import KINDS
 from ..options import DETECTION, SELECTION
-from .guard import LARGEST_UPLOAD, Guard
+from .guard import LARGEST_UPLOAD, Guard, expect_free
 from .session import SHARING, SLIDERS, SWITCHES, VIEWS, Results, Session
 
 _FIRST = ("depth", "edges", "distance", "regions")
@@ -83,6 +83,7 @@ _HEAD = """
 
 def serve(session: Session, host: str, port: int, *, browser: bool) -> None:
     """Serve the page until interrupted. Everyone who opens it sees an image and parameters of their own."""
+    expect_free(host, port)
 
     @ui.page("/", title=f"{session.title} - rangeedge")
     def index() -> None:
