@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Mapping
@@ -20,9 +21,11 @@ from .noise_model import NoiseModel
 from .options import DETECTION
 
 _SUFFIXES = (".xml", ".yml", ".yaml", ".json")  # by which cv2.FileStorage knows the format
-_TYPES = dict(zip("ucwsifd", ("u1", "i1", "u2", "i2", "i4", "f4", "f8"), strict=True))  # of cv2's matrices
 # The first and the last key of a file that `save` has written: YAML that has lost its end is YAML again.
 _OPENING, _CLOSING = "savedBy", "complete"
+_FILE_BYTES = 2**28
+_DEPTH = 32  # levels of nesting
+_KINDS = {"u": "u1", "c": "i1", "w": "u2", "s": "i2", "i": "i4", "f": "f4", "d": "f8", "h": "f2"}  # by OpenCV's letters
 
 
 def save(filename: str | os.PathLike[str], node: str, values: Mapping[str, Any]) -> None:
@@ -40,18 +43,47 @@ def save(filename: str | os.PathLike[str], node: str, values: Mapping[str, Any])
 
 
 def load(filename: str | os.PathLike[str], node: str) -> tuple[str, dict[str, Any]]:
-    """The name of a file, and the values under the node of that name in it."""
+    """The name of a file, and the values under the node of that name in it.
+
+    By our own reader: that of OpenCV does not survive every file that is garbled.
+    """
     name = file_name(filename, "filename")
     with opened(name) as (stream, size):
+        if size > _FILE_BYTES:
+            raise ValueError(f"it has {size} bytes, more than parameters")
         tree = parse(stream.read(size).decode("utf-8-sig"))
-    if not isinstance(tree, Mapping) or not isinstance(tree.get(node), Mapping):
-        raise error(f"{name!r} holds no `{node}`", cv2.Error.StsParseError)
-    if _OPENING in tree and tree.get(_CLOSING) != 1:
-        raise error(f"{name!r} is not complete", cv2.Error.StsParseError)
+        found = tree.get(node) if isinstance(tree, dict) else None
+        if not isinstance(found, dict):
+            raise ValueError(f"it holds no `{node}`")
+        if _OPENING in tree and tree.get(_CLOSING) != 1:
+            raise ValueError("it is not complete")
     try:
-        return name, _checked({key: _tree_value(key, value) for key, value in tree[node].items()})
+        return name, _typed({key: _tree_value(key, value) for key, value in found.items()})
     except error as problem:
         raise error(f"{name!r}: {problem.err}", problem.code) from None
+
+
+def _tree_value(name: str, value: Any) -> Any:
+    """What `_write_node` has written, from nested dicts and lists."""
+    if isinstance(value, dict):
+        if "dt" in value:
+            return _matrix(name, value)
+        return {key: _tree_value(key, item) for key, item in value.items()}
+    return tuple(_tree_value(name, item) for item in value) if isinstance(value, list) else value
+
+
+def _matrix(name: str, stored: Mapping[str, Any]) -> np.ndarray:
+    """An array of `cv2.FileStorage`: its size, the type of its elements, which may have channels, and these."""
+    try:
+        sizes = np.array(stored["sizes"] if "sizes" in stored else [stored["rows"], stored["cols"]]).ravel().tolist()
+        channels, kind = re.fullmatch(r"(\d{0,3})([a-z])", str(stored["dt"])).groups()  # type: ignore[union-attr]
+        values = np.array(stored["data"], _KINDS[kind]).ravel()
+        shape = (*sizes, int(channels)) if channels not in ("", "1") else tuple(sizes)
+        if math.prod(shape) != len(values) or min(shape, default=0) < 0:
+            raise ValueError(f"it has {len(values)} elements")
+        return values.reshape(shape)
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as reason:
+        raise error(f"`{name}` is a damaged matrix: {reason}", cv2.Error.StsParseError) from reason
 
 
 def write(fs: cv2.FileStorage, node: str, values: Mapping[str, Any]) -> None:
@@ -68,10 +100,11 @@ def write(fs: cv2.FileStorage, node: str, values: Mapping[str, Any]) -> None:
 
 def read(node: cv2.FileNode) -> dict[str, Any]:
     """The values under a node, in the types of Python."""
-    return _checked({name: _node_value(node.getNode(name)) for name in node.keys()})  # noqa: SIM118
+    return _typed({name: _node_value(node.getNode(name)) for name in node.keys()})  # noqa: SIM118
 
 
-def _checked(values: dict[str, Any]) -> dict[str, Any]:
+def _typed(values: dict[str, Any]) -> dict[str, Any]:
+    """Values as options have them."""
     for name, option in DETECTION.items():  # a file storage knows no bool
         if isinstance(option.default, bool) and isinstance(values.get(name), int) and values[name] in (0, 1):
             values[name] = bool(values[name])
@@ -101,43 +134,24 @@ def _write_node(fs: cv2.FileStorage, name: str, value: Any) -> None:
         fs.write(name, float(value))
 
 
-def _tree_value(name: str, value: Any) -> Any:
-    """What `_write_node` has written, of nested dicts and lists."""
-    if isinstance(value, list):
-        return tuple(_tree_value(name, element) for element in value)
-    if not isinstance(value, Mapping):
-        return value
-    return _matrix(name, value) if "dt" in value else {key: _tree_value(key, own) for key, own in value.items()}
-
-
-def _matrix(name: str, parts: Mapping[str, Any]) -> np.ndarray:
-    """A matrix of one channel as cv2 writes it: rows and cols, or sizes, with type and data."""
-    try:
-        shape = np.ravel(parts["sizes"] if "sizes" in parts else (parts["rows"], parts["cols"])).tolist()
-        values = np.array(parts["data"], np.float64).ravel()
-        if min(shape, default=0) < 1:
-            raise ValueError(f"its size is {shape}")
-        return values.reshape(shape).astype(_TYPES[parts["dt"]])
-    except (KeyError, TypeError, ValueError, OverflowError) as reason:
-        raise error(f"`{name}` is a damaged matrix: {reason}", cv2.Error.StsParseError) from reason
-
-
-def _node_value(node: cv2.FileNode) -> Any:
-    """The same of nodes of a file storage."""
+def _node_value(node: cv2.FileNode, depth: int = 0) -> Any:
+    """What `_write_node` has written, in the types of Python."""
+    if depth > _DEPTH:
+        raise error(f"it is nested more than {_DEPTH} levels", cv2.Error.StsParseError)
     if node.isInt():
         return int(node.real())
     if node.isReal():
         return node.real()
     if node.isSeq():
-        return tuple(_node_value(node.at(i)) for i in range(node.size()))
+        return tuple(_node_value(node.at(i), depth + 1) for i in range(node.size()))
     if not node.isMap():
         return node.string() if node.isString() else None
     keys = node.keys()
-    if "dt" not in keys:
-        return {key: _node_value(node.getNode(key)) for key in keys}
-    try:
-        if not {"data"} < set(keys) or not ({"rows", "cols"} <= set(keys) or "sizes" in keys):
-            raise error("it lacks its size or data")
-        return node.mat()
-    except cv2.error as problem:
-        raise error(f"`{node.name()}` is a damaged matrix: {problem.err}", problem.code) from problem
+    if "dt" in keys:
+        try:
+            if "data" not in keys or not ({"rows", "cols"} <= set(keys) or "sizes" in keys):
+                raise error("it lacks its size or data")  # which OpenCV does not survive
+            return node.mat()
+        except cv2.error as problem:
+            raise error(f"`{node.name()}` is a damaged matrix: {problem.err}", problem.code) from problem
+    return {key: _node_value(node.getNode(key), depth + 1) for key in keys}

@@ -21,6 +21,7 @@ from ..io.source import file_name
 from ..plausible import collected
 from ..recording import FrameSource
 from ..recording.manifest import Line, Manifest, complete, state_of
+from ..recording.workers import expect_guard
 from .results import plain
 from .tasks import Counts
 
@@ -99,6 +100,7 @@ def run_frames(
     job: Job, frames: list[FrameSource], manifest: Manifest, force: bool, **workers: Any
 ) -> Iterator[BatchItem]:
     """What becomes of each frame, in their order, each when it and those before it are done."""
+    expect_guard(workers.get("jobs", 1))
     _expect_apart(job, frames)
     with manifest.opened():
         _sweep(job.out)

@@ -86,10 +86,12 @@ def write_svg(lines: list[Line], picture: np.ndarray | None = None) -> bytes:
     text.append('<g fill="none" stroke-linejoin="round" stroke-linecap="round">')
     for group in grouped(lines):
         path = " ".join(_path(line) for line in group)
-        colour = _COLOURS.get(group[0].kind.split()[0], "#ffffff")
+        colour = _COLOURS.get(group[0].kind.partition(" ")[0], "#ffffff")
         fill = f' fill="{colour}" fill-opacity="0.15" fill-rule="evenodd"' if group[0].kind == REGION else ""
         known = quoteattr(json.dumps([line.properties for line in group]))
-        text.append(f'<path class="{group[0].kind}" stroke="{colour}"{fill} data-properties={known} d="{path}"/>')
+        text.append(
+            f'<path class={quoteattr(group[0].kind)} stroke="{colour}"{fill} data-properties={known} d="{path}"/>'
+        )
     return "\n".join([*text, "</g>", "</svg>", ""]).encode()
 
 
@@ -104,8 +106,8 @@ def read_svg(data: bytes) -> list[Line]:
         known = json.loads(path.get("data-properties", "[]"))
         for i, part in enumerate(path.get("d", "").split("M ")[1:]):
             closed = part.rstrip().endswith("Z")
-            places = part.replace("Z", "").split(" L ")
-            pixels = np.array([place.strip().split(",") for place in places], np.float64).reshape(-1, 2)
+            places = part.replace("Z", "").replace("L", " ").split()
+            pixels = np.array([place.split(",") for place in places], np.float64).reshape(-1, 2)
             own = known[i] if i < len(known) else {}
             lines.append(Line(path.get("class", ""), closed, pixels, np.full((len(pixels), 3), np.nan), own))
     return lines

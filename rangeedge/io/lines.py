@@ -116,7 +116,7 @@ def readLines(filename: str | os.PathLike[str]) -> list[Line]:
 
     Formats hold different things: all have kinds and, but for SVG, points; CSV, PLY and SVG pixels; CSV and GeoJSON all
     properties, SVG and DXF too, PLY the angle alone. GeoJSON with a transform has map coordinates for x and y. In a
-    PLY file lines of a single point are lost.
+    PLY file lines of a single point are lost, in PLY and CSV those without points.
 
     Parameters
     ----------
@@ -149,11 +149,11 @@ def readLines(filename: str | os.PathLike[str]) -> list[Line]:
     with opened(name) as (stream, size):
         data = stream.read(size)
         try:
-            return _FORMATS[suffix].function("read", suffix)(data)
-        except (ValueError, KeyError, IndexError, TypeError, SyntaxError, RecursionError) as reason:
-            if isinstance(reason, error):
+            return toLines(_FORMATS[suffix].function("read", suffix)(data))
+        except Exception as reason:  # readers of text raise what comes of the words they meet
+            if isinstance(reason, error) and isinstance(reason.__context__, ImportError):
                 raise
-            raise ValueError(f"it holds no lines ({reason})") from reason
+            raise ValueError(f"it holds no lines ({getattr(reason, 'err', reason)})") from reason
 
 
 def encoded_lines(suffix: str, lines: Any, **options: Any) -> bytes:
@@ -167,7 +167,13 @@ def encoded_lines(suffix: str, lines: Any, **options: Any) -> bytes:
         if picture.dtype != np.uint8 or picture.shape[2] != 3:
             raise fail("picture", "a CV_8UC3 picture", described(picture))
     own = _FORMATS[suffix]
-    return own.function("write", suffix)(toLines(lines), **{name: options.get(name) for name in own.takes})
+    lines = toLines(lines)
+    try:
+        return own.function("write", suffix)(lines, **{name: options.get(name) for name in own.takes})
+    except (ArithmeticError, ValueError) as reason:  # of values that are infinite or not in every format
+        if isinstance(reason, error):
+            raise
+        raise fail("lines", f"what {suffix} can hold", f"lines of which it cannot ({reason})") from reason
 
 
 def is_line_file(path: str | os.PathLike[str]) -> bool:

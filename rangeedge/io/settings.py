@@ -1,8 +1,8 @@
-"""Settings in YAML, JSON or XML as nested dicts and lists, as far as files of cameras and of parameters need them.
+"""Settings in YAML, JSON or XML as nested dicts and lists, as far as files of cameras and parameters need them.
 
-Of YAML it reads what calibration tools and `cv2.FileStorage` write: maps by indentation, lists in brackets or by
-dashes, plain and quoted scalars, comments; a tag such as ``!!opencv-matrix`` is passed over. Anchors, block texts and
-the rest are refused, and so is a key that is given twice. The parser of cv2 itself does not survive every file.
+Of YAML it reads what calibration tools write: maps by indentation, lists in brackets or by dashes, plain and quoted
+scalars, comments; a tag such as ``!!opencv-matrix`` is passed over. Anchors, block texts and the rest are refused, and
+so is a key that is given twice; elements of XML of the same name are a list.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from collections.abc import Iterable
 from typing import Any
 
 _DEPTH = 32  # levels of nesting
-_CONSTANT = re.compile(r'("(?:[^"\\]|\\.)*")|(?<![\w.])(-?)\.(Inf|Nan)\b')  # of cv2; or a text in quotes
+# What is no number, as cv2.FileStorage writes it and as JSON does.
+_OF_JSON = {".Inf": "Infinity", "-.Inf": "-Infinity", ".Nan": "NaN", "-.Nan": "NaN"}
+_STORED = re.compile(r"(?<=[\s\[:,])-?\.(?:Inf|Nan)\b")
 
 
 def parse(text: str) -> Any:
@@ -24,15 +26,10 @@ def parse(text: str) -> Any:
         return _from_xml(start)
     if start.startswith(("{", "[")):
         try:
-            return json.loads(_CONSTANT.sub(_constant, start), object_pairs_hook=_map_of)
+            return json.loads(_STORED.sub(lambda found: _OF_JSON[found[0]], start), object_pairs_hook=_map_of)
         except json.JSONDecodeError as reason:
             raise ValueError(f"its JSON is garbled: {reason}") from None
     return _Yaml(text).document()
-
-
-def _constant(found: re.Match[str]) -> str:
-    """As JSON in Python has them; texts in quotes stay."""
-    return found[1] or found[2] + {"Inf": "Infinity", "Nan": "NaN"}[found[3]]
 
 
 def _map_of(entries: Iterable[tuple[str, Any]]) -> dict[str, Any]:
@@ -61,7 +58,7 @@ def _of_element(element: ElementTree.Element, depth: int = 0) -> Any:
         found: dict[str, list[Any]] = {}
         for child in element:
             found.setdefault(child.tag, []).append(_of_element(child, depth + 1))
-        if found.keys() == {"_"}:  # elements of a sequence, as cv2 has them
+        if found.keys() == {"_"}:  # a list of lists of cv2.FileStorage
             return found["_"]
         return {tag: values[0] if len(values) == 1 else values for tag, values in found.items()}
     words = (element.text or "").split()
@@ -164,8 +161,6 @@ class _Yaml:
 
 def _without_comment(line: str) -> str:
     """The line up to a # that is not within quotes."""
-    if "#" not in line:
-        return line
     quote = ""
     for i, char in enumerate(line):
         if quote:
@@ -197,7 +192,7 @@ def _brackets(text: str) -> int:
 class _Flow:
     """A value in brackets or braces."""
 
-    _TOKEN = re.compile(r"""\s*([\[\]{},:]|"[^"]*"|'[^']*'|[^\s\[\]{},:"'][^\[\]{},:]*)""")
+    _TOKEN = re.compile(r"""([\[\]{},:]|"[^"]*"|'[^']*'|[^\s\[\]{},:"'][^\[\]{},:]*)""")
 
     def __init__(self, text: str) -> None:
         self.tokens = [token.strip() for token in self._TOKEN.findall(text)]
