@@ -1,5 +1,6 @@
 """Files, names, folders and streams that nobody means: one line says what is wrong, and nothing crashes."""
 
+import contextlib
 import json
 import os
 import subprocess
@@ -436,3 +437,30 @@ print(told)
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, env=environment, timeout=120)
     assert (run.returncode, run.stderr) == (0, "")
     assert "interpreter" in run.stdout
+
+
+@pytest.mark.parametrize("correlation", [1, 1 + 1e-12, 2, 1e6])
+@pytest.mark.parametrize("length", [0, 5e-324, 1e-200, 1e-3, 1e160, 1e308])
+def test_waves_of_any_length(correlation, length):
+    """Shorter than any pixel they are white noise, without end one error of all pixels."""
+    model = rangeedge.NoiseModel(0.001, correlation=correlation, length=length)
+    factors = model.of_fits()
+    assert np.isfinite(factors).all()
+    depth = np.where(np.arange(60) < 30, 1.0, 2.0) + np.random.default_rng(0).normal(0, 0.001, (40, 60))
+    why = rangeedge.explainPixel(depth, 29, 20, K=(60, 60, 30, 20), noise=model)
+    assert why.edge or correlation == 1e6
+    if 0 < length < 1:
+        short = rangeedge.NoiseModel(0.001, correlation=correlation, length=0.1).of_fits()
+        np.testing.assert_allclose(factors, short, rtol=1e-6)
+
+
+@pytest.mark.parametrize("correlation", [1e6 + 1, 1e200, np.inf, np.nan, 0.5])
+def test_waves_beyond_all_bounds(correlation):
+    with pytest.raises(rangeedge.error, match="`correlation` must be a finite number >= 1 and <= 1e\\+06"):
+        rangeedge.NoiseModel(0.001, correlation=correlation)
+
+
+@pytest.mark.parametrize("radius", [1e-300, 1e160, 1e300])
+def test_solids_beyond_double_precision(radius):
+    with contextlib.suppress(rangeedge.error):
+        rangeedge.synthetic.renderScene(rangeedge.synthetic.twoCylinders(radius), rangeedge.synthetic.kinectCamera())
