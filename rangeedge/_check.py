@@ -103,7 +103,7 @@ def array(name: str, value: Any, expected: str, ndim: Collection[int] = (2,)) ->
         limit = f"2^{PIXEL_LIMIT.bit_length() - 1}"
         expected = f"{expected} of fewer than {limit} pixels, a margin of one included (runBlocks takes larger images)"
         raise fail(name, expected, described(value), cv2.Error.StsBadSize)
-    return value
+    return np.asarray(value)  # np.matrix and the like have ways of their own
 
 
 def image8(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
@@ -215,12 +215,14 @@ def camera_matrix(name: str, value: Any) -> np.ndarray:
 def camera_file(name: str, path: str | os.PathLike[str]) -> Camera:
     """The camera that a file describes."""
     from .io.camera import read_camera
+    from .io.source import file_name
 
+    path = file_name(path, name)
     try:
         return read_camera(path)
     except (OSError, ValueError) as reason:
         what = getattr(reason, "err", None) or getattr(reason, "strerror", None) or reason
-        raise fail(name, "a camera or the name of a file of one", f"{os.fspath(path)!r} ({what})") from None
+        raise fail(name, "a camera or the name of a file of one", f"{path!r} ({what})") from None
 
 
 def distortion(name: str, value: Any) -> np.ndarray:

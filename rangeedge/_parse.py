@@ -56,7 +56,7 @@ def pixel_size(text: str) -> float | tuple[float, ...]:
 def image_size(text: str) -> list[int]:
     """Width and height as 640,480 or 640x480."""
     width, height = _numbers(text.lower().replace("x", ","), (2,), "a width and a height, 640,480")
-    if width != int(width) or height != int(height):
+    if not (width.is_integer() and height.is_integer()):
         raise ValueError(f"must be whole numbers, got {text!r}")
     return [int(width), int(height)]
 

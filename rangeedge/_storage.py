@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from ._check import described, error, fail
-from .io.atomic import write_atomically
+from .io.atomic import write_atomically, writing
 from .io.settings import parse
 from .io.source import file_name, opened
 from .noise_model import NoiseModel
@@ -38,11 +38,8 @@ def save(filename: str | os.PathLike[str], node: str, values: Mapping[str, Any])
     fs.write(_OPENING, "rangeedge")
     write(fs, node, values)
     fs.write(_CLOSING, 1)
-    try:
+    with writing(name):
         write_atomically(name, fs.releaseAndGetString().encode())
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise error(f"cannot write {name!r}: {what}", cv2.Error.StsError) from reason
 
 
 def load(filename: str | os.PathLike[str], node: str) -> tuple[str, dict[str, Any]]:
@@ -54,7 +51,7 @@ def load(filename: str | os.PathLike[str], node: str) -> tuple[str, dict[str, An
     with opened(name) as (stream, size):
         if size > _FILE_BYTES:
             raise ValueError(f"it has {size} bytes, more than parameters")
-        tree = parse(stream.read(size).decode())
+        tree = parse(stream.read(size).decode("utf-8-sig"))
         found = tree.get(node) if isinstance(tree, dict) else None
         if not isinstance(found, dict):
             raise ValueError(f"it holds no `{node}`")
@@ -152,6 +149,8 @@ def _node_value(node: cv2.FileNode, depth: int = 0) -> Any:
     keys = node.keys()
     if "dt" in keys:
         try:
+            if "data" not in keys or not ({"rows", "cols"} <= set(keys) or "sizes" in keys):
+                raise error("it lacks its size or data")  # which OpenCV does not survive
             return node.mat()
         except cv2.error as problem:
             raise error(f"`{node.name()}` is a damaged matrix: {problem.err}", problem.code) from problem

@@ -77,7 +77,7 @@ def cleanDepth(
     -------
     depth : ndarray of the shape, type and unit of `src`
         Removed pixels without data are 0 among integers (the least value of the type in a `heightMap` of signed ones),
-        NaN among floats, or the first value of `invalid`. Integers are rounded.
+        NaN among floats, or the first value of `invalid` that the type has. Integers are rounded.
     changed : (H, W) CV_8U
         0 where a pixel is as it was; else bits: CLEAN_SMOOTHED; CLEAN_REMOVED, it was a flying pixel; CLEAN_FILLED, it
         was a hole.
@@ -261,10 +261,12 @@ def _delivered(
 
 
 def _no_data(values: np.ndarray, params: ScanLineParams) -> float:
-    """What marks a pixel without data."""
+    """What marks a pixel without data: the first value given that the type has, else its own."""
     single = [low for low, high in params.invalid or () if low == high]
-    if single:
-        return single[0]
     if values.dtype.kind == "f":
-        return np.nan
-    return np.iinfo(values.dtype).min if params.heightMap else 0
+        return single[0] if single else np.nan
+    info = np.iinfo(values.dtype)
+    fitting = [int(value) for value in single if value.is_integer() and info.min <= value <= info.max]
+    if fitting:
+        return fitting[0]
+    return info.min if params.heightMap else 0

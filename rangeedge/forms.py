@@ -42,13 +42,14 @@ def _as_array(src: Any) -> np.ndarray:
     if isinstance(src, np.ndarray):
         return src
     if isinstance(src, cv2.UMat):
-        return src.get()
+        values = src.get()
+        return np.empty(0) if values is None else values
     try:
         if hasattr(src, "__dlpack__") and not hasattr(src, "__array__"):
             return np.from_dlpack(src)
         if hasattr(src, "__array__") or hasattr(src, "__array_interface__"):
             return np.asarray(src)
-    except (TypeError, ValueError, RuntimeError, BufferError) as reason:
+    except (TypeError, ValueError, AttributeError, RuntimeError, BufferError) as reason:
         raise fail("src", f"{SRC}, on the CPU", f"{type(src).__name__} ({reason})") from None
     raise fail("src", SRC, f"{type(src).__name__}{_hint(src)}")
 

@@ -19,6 +19,7 @@ from .plausible import warn_of_dropped
 from .sectors import Turn, turn_of
 from .viewpoint import distorted_rays, view_of
 
+_DIGITS = 53  # of double precision, binary
 _THREAD_PIXELS = 1 << 14  # an image smaller than this is not worth a second thread
 
 
@@ -191,6 +192,7 @@ def read_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None 
         found = _holds(src, params.invalid)
         if found.any():
             seen = ~found if seen is None else seen & ~found
+    _expect_exact(src, seen)
     if src.ndim == 3:
         return _points(src, seen, params)
     if params.K is not None:
@@ -215,8 +217,7 @@ def checked(src: np.ndarray, params: ScanLineParams) -> tuple[np.ndarray, np.nda
         raise fail("distCoeffs", "None where K is not given", described(params.distCoeffs))
     if K is None and params.imageSize is not None:
         raise fail("imageSize", "None where K is not given", described(params.imageSize))
-    if params.imageSize is not None and params.imageSize != (src.shape[1], src.shape[0]):
-        raise _other_size(src.shape, params.imageSize)
+    expect_size(src.shape, params.imageSize)
     for name in ("K", "pixelSize") if points else ("origin",):
         if getattr(params, name) is not None:
             form = "points" if points else "no points"
@@ -226,11 +227,14 @@ def checked(src: np.ndarray, params: ScanLineParams) -> tuple[np.ndarray, np.nda
     return src, seen
 
 
-def _other_size(shape: tuple[int, ...], size: tuple[int, int]) -> Exception:
-    """What to say of an image that K does not hold for."""
-    (width, height), (own_width, own_height) = size, (shape[1], shape[0])
+def expect_size(shape: tuple[int, ...], size: tuple[int, int] | None) -> None:
+    """Refuse an image that K does not hold for."""
+    own_width, own_height = shape[1], shape[0]
+    if size is None or size == (own_width, own_height):
+        return
+    width, height = size
     x, y = own_width / width, own_height / height
-    return error(
+    raise error(
         f"`src` has {own_width} x {own_height} pixels, but K holds for {width} x {height}: where the image was resized,"
         f" give (x fx, y fy, x (cx + 0.5) - 0.5, y (cy + 0.5) - 0.5) with x = {x:.6g} and y = {y:.6g}; where it was"
         " cropped, subtract its first column and row from cx and cy; or say by imageSize what K holds for",
@@ -259,6 +263,21 @@ def _lengths(src: np.ndarray, depthFactor: float, heightMap: bool = False) -> np
     lengths = np.divide(src, real(depthFactor), dtype=real, order="C")
     lengths[src <= (np.iinfo(src.dtype).min if heightMap else 0)] = np.nan
     return lengths
+
+
+def _expect_exact(src: np.ndarray, seen: np.ndarray | None) -> None:
+    """Refuse integers that double precision would round; the least of the type stands for no data."""
+    if src.dtype.kind not in "iu" or src.dtype.itemsize < 8:
+        return
+    rounded = src > 2**_DIGITS
+    if src.dtype.kind == "i":
+        rounded |= (src < -(2**_DIGITS)) & (src > np.iinfo(src.dtype).min)
+    if (rounded if seen is None else rounded & seen).any():
+        raise error(
+            f"`src` holds integers beyond 2^{_DIGITS}, which double precision rounds: subtract what they share, or"
+            " say by invalid which of them stand for no data",
+            cv2.Error.StsOutOfRange,
+        )
 
 
 def _step(src: np.ndarray, depthFactor: float) -> float:

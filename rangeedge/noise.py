@@ -10,7 +10,7 @@ from . import _core
 from ._option import parsed, takes
 from .forms import range_array
 from .frame import Frame, read_frame
-from .noise_model import NoiseModel, correlation_of, independent
+from .noise_model import LARGEST_CORRELATION, NoiseModel, correlation_of, independent
 from .options import GEOMETRY, ScanLineParams
 from .plausible import question_geometry, warn_of_thresholds
 
@@ -94,4 +94,4 @@ def estimated(frame: Frame) -> NoiseModel:
     (a, b, c, _), fits = numbers[:4], tuple(numbers[4:])
     if frame.ranges:
         fits = independent(fits)
-    return NoiseModel(a, b, c, max(1.0, correlation_of(fits)), fits=fits)
+    return NoiseModel(a, b, c, min(max(1.0, correlation_of(fits)), LARGEST_CORRELATION), fits=fits)

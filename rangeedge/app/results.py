@@ -29,7 +29,7 @@ from ..draw import drawRegions, edge_overview, region_overview
 from ..edges import EdgeStrength, measure_both
 from ..frame import Frame
 from ..io import RangeImage
-from ..io.atomic import nameless, put
+from ..io.atomic import nameless, put, writing
 from ..io.lines import encoded_lines
 from ..noise import measured_frame
 from ..options import DETECTION, Growing, ScanLineParams, Selection
@@ -245,24 +245,20 @@ def write_folder(out: str | os.PathLike[str], files: Mapping[str, bytes]) -> Non
     is removed first and comes last: a folder that has one holds results of one run.
     """
     out = Path(out)
-    ancestor = next(path for path in (out, *out.absolute().parents) if path.exists())
-    stage = ancestor / f".{uuid.uuid4().hex}.tmp"
-    try:
-        with contextlib.ExitStack() as stack:
-            whole = {name: nameless(ancestor, data) for name, data in files.items()}
-            for file in filter(None, whole.values()):
-                stack.enter_context(file)
-            stage.mkdir()
-            stack.callback(shutil.rmtree, stage, ignore_errors=True)
-            for name, data in files.items():
-                put(stage / name, whole[name], data)
-            if out.exists():
-                (out / _REPORT).unlink(missing_ok=True)
-                for name in sorted(files, key=lambda name: name == _REPORT):  # the report comes last
-                    os.replace(stage / name, out / name)
-            else:
-                out.absolute().parent.mkdir(parents=True, exist_ok=True)
-                stage.rename(out)
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise error(f"cannot write to {os.fspath(out)!r}: {what}", cv2.Error.StsError) from reason
+    with writing(out, "cannot write to"), contextlib.ExitStack() as stack:
+        ancestor = next(path for path in (out, *out.absolute().parents) if path.exists())
+        stage = ancestor / f".{uuid.uuid4().hex}.tmp"
+        whole = {name: nameless(ancestor, data) for name, data in files.items()}
+        for file in filter(None, whole.values()):
+            stack.enter_context(file)
+        stage.mkdir()
+        stack.callback(shutil.rmtree, stage, ignore_errors=True)
+        for name, data in files.items():
+            put(stage / name, whole[name], data)
+        if out.exists():
+            (out / _REPORT).unlink(missing_ok=True)
+            for name in sorted(files, key=lambda name: name == _REPORT):  # the report comes last
+                os.replace(stage / name, out / name)
+        else:
+            out.absolute().parent.mkdir(parents=True, exist_ok=True)
+            stage.rename(out)

@@ -14,12 +14,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from .. import __version__
-from .._check import error
+from .._check import error, fail
 from ..frames import outcomes_of
 from ..io import RangeImage
+from ..io.source import file_name
 from ..plausible import collected
 from ..recording import FrameSource
-from ..recording.manifest import Line, Manifest, changed, complete
+from ..recording.manifest import Line, Manifest, complete, state_of
 from ..recording.workers import expect_guard
 from .results import plain
 from .tasks import Counts
@@ -28,6 +29,14 @@ if TYPE_CHECKING:
     from ..recording.workers import Outcome
 
 _STAGE = re.compile(r"\.[0-9a-f]{32}\.tmp")  # what a run that was killed may leave behind
+
+
+def root_of(out: str | os.PathLike[str]) -> Path:
+    """Where results go; no name is not the current folder."""
+    name = file_name(out, "out")
+    if not name:
+        raise fail("out", "the name of a folder or of a store", repr(name))
+    return Path(name)
 
 
 class BatchItem(NamedTuple):
@@ -74,9 +83,10 @@ class Job:
         return (
             line is not None
             and line.get("state") == "written"
+            and _are_counts(line.get("counts"))
             and line.get("rangeedge") == __version__
             and (line.get("input"), line.get("part")) == (frame.path, frame.part)
-            and line.get("modified") == changed(frame.path)
+            and state_of(frame.path).items() <= line.items()
             and line.get("parameters") == self.parameters(frame)
             and complete(self.out, line)
         )
@@ -101,10 +111,10 @@ def run_frames(
         manifest.keep(done)
         job.prepare(frames, fresh=not done)
         pending = [(index, frame) for index, frame in enumerate(frames) if frame.name not in done]
-        modified = {frame.path: changed(frame.path) for _, frame in pending}
+        states = {frame.path: state_of(frame.path) for _, frame in pending}
         outcomes: Any = outcomes_of(functools.partial(_warned, job), pending, **workers)
         try:
-            yield from _items(job, frames, manifest, done, modified, outcomes)
+            yield from _items(job, frames, manifest, done, states, outcomes)
         except BaseException:
             outcomes.close()
             if workers.get("client") is None:  # whose workers may still be writing
@@ -117,7 +127,7 @@ def _items(
     frames: list[FrameSource],
     manifest: Manifest,
     done: set[str],
-    modified: dict[str, Any],
+    states: Mapping[str, Line],
     outcomes: Iterator[Outcome],
 ) -> Iterator[BatchItem]:
     """What becomes of each frame, noted down before it is told."""
@@ -138,7 +148,7 @@ def _items(
             "counts": counts,
             "seconds": round(outcome.seconds, 4),
             "parameters": job.parameters(frame),
-            "modified": modified[frame.path],
+            **states[frame.path],
             "rangeedge": __version__,
         }
         said = {"error": outcome.error, "warnings": list(warnings)}
@@ -148,13 +158,25 @@ def _items(
             raise error(f"nothing more can be written to {str(job.out)!r}; make room, and run it again")
 
 
+def _are_counts(counts: Any) -> bool:
+    return isinstance(counts, Mapping) and all(type(count) is int for count in counts.values())
+
+
 def _expect_apart(job: Job, frames: list[FrameSource]) -> None:
     """Refuse to write over what is read."""
-    inputs = {os.path.realpath(frame.path): frame.path for frame in frames}
+    inputs = {_real(frame.path): frame.path for frame in frames}
     for frame in frames:
-        place = os.path.realpath(job.place(frame))
+        place = _real(job.place(frame))
         if place in inputs:
             raise error(f"results would replace the input {inputs[place]!r}; give another `out`")
+
+
+def _real(path: str | os.PathLike[str]) -> str:
+    """Where a path leads; one that leads nowhere is told of when it is read or written."""
+    try:
+        return os.path.realpath(path)
+    except (OSError, ValueError):
+        return os.fspath(path)
 
 
 def _sweep(out: Path) -> None:

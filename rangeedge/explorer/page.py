@@ -18,6 +18,7 @@ from ..cancellation import Cancellation
 from ..draw import drawExplanation
 from ..draw.palette import KINDS
 from ..options import DETECTION, SELECTION
+from .guard import LARGEST_UPLOAD, Guard, expect_free
 from .session import SHARING, SLIDERS, SWITCHES, VIEWS, Results, Session
 
 _FIRST = ("depth", "edges", "distance", "regions")
@@ -40,7 +41,6 @@ _GEOMETRY = {
     "invalid": "no data",
 }
 _GROUPS = {"Which edges count": SELECTION, "How scan lines are cut": DETECTION.keys() - SELECTION.keys()}
-_LARGEST_UPLOAD = 200_000_000  # bytes
 _ENCODING = (cv2.IMWRITE_JPEG_QUALITY, 95, cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444)
 _HEAD = """
 <style>
@@ -83,12 +83,14 @@ _HEAD = """
 
 def serve(session: Session, host: str, port: int, *, browser: bool) -> None:
     """Serve the page until interrupted. Everyone who opens it sees an image and parameters of their own."""
+    expect_free(host, port)
 
     @ui.page("/", title=f"{session.title} - rangeedge")
     def index() -> None:
         _Page(session.copy())
 
-    address = f"http://{host}:{port}/"
+    app.add_middleware(Guard, host=host)
+    address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
     print(f"The explorer is at {address}; end it with Ctrl-C.", flush=True)
     if browser:
         app.on_startup(lambda: webbrowser.open(address))
@@ -134,7 +136,7 @@ class _Page:
         session = self.session
         _heading("Image")
         ui.upload(
-            label="drop a range image here", auto_upload=True, max_file_size=_LARGEST_UPLOAD, on_upload=self._uploaded,
+            label="drop a range image here", auto_upload=True, max_file_size=LARGEST_UPLOAD, on_upload=self._uploaded,
             on_rejected=lambda: self._complain("the file is larger than 200 MB"),
         ).props("flat bordered").classes("w-full")  # fmt: skip
         self.geometry = {}

@@ -87,7 +87,7 @@ class Session:
     def upload(self, name: str, content: bytes) -> None:
         """Take what a user has dropped."""
         with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / f"image{Path(name).suffix}"
+            path = Path(folder) / "image"
             path.write_bytes(content)
             image = imreadRange(path)
             known = {n: v for n, v in self.image.geometry.items() if n in ("K", "depthFactor") and image.src.ndim == 2}
@@ -158,7 +158,7 @@ class Session:
         """The parameters as a program."""
         given = {**self.geometry, **self.options}
         words = [f"    {name}={_written(value)},\n" for name, value in given.items()]
-        read = f'src = rangeedge.imreadRange("{self.title}").src\n'
+        read = f"src = rangeedge.imreadRange({self.title!r}).src\n"
         return f"import rangeedge\n\n{read}edges = rangeedge.detectEdges(\n    src,\n{''.join(words)})\n"
 
     def settings(self) -> bytes:

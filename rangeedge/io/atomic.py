@@ -6,8 +6,25 @@ import contextlib
 import os
 import stat
 import uuid
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
+
+import cv2
+
+from .._check import error
+
+
+@contextlib.contextmanager
+def writing(path: str | os.PathLike[str], what: str = "cannot write") -> Iterator[None]:
+    """What cannot be written is an error that names the file or folder."""
+    try:
+        yield
+    except (OSError, ValueError) as reason:
+        if isinstance(reason, error):
+            raise
+        why = getattr(reason, "strerror", None) or reason
+        raise error(f"{what} {os.fspath(path)!r}: {why}", cv2.Error.StsError) from reason
 
 
 def write_atomically(path: str | os.PathLike[str], data: bytes) -> None:

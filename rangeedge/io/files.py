@@ -15,7 +15,7 @@ from ..frame import checked
 from ..options import ScanLineParams
 from .arrays import read_npy, read_npz, write_npy, write_npz
 from .ascii_grid import is_ascii_grid, read_ascii_grid
-from .atomic import write_atomically
+from .atomic import write_atomically, writing
 from .exr import read_exr, write_exr
 from .pcd import is_pcd, read_pcd, write_pcd
 from .pictures import PNG_MAGIC, read_pfm, read_pgm, read_png, write_pfm, write_pgm, write_png
@@ -190,7 +190,7 @@ def imwriteRange(
         raise _check.fail("path", f"a file name with one of the suffixes {' '.join(_WRITERS)}", repr(name))
     if given and suffix != ".npz":
         raise _check.fail(next(iter(given)), f"None for {suffix} (only .npz holds a geometry)", "a value")
-    if need := _unfit(src):
+    if need := unfit(src):
         raise _check.fail("src", need, _check.described(src), cv2.Error.StsUnsupportedFormat)
     try:
         data = _WRITERS[suffix](_native(src), **given)
@@ -198,11 +198,8 @@ def imwriteRange(
         raise _check.fail("src", f"{reason} for {suffix}", _check.described(src)) from None
     except ImportError as reason:
         raise _check.error(f"cannot write {name!r}: {reason}") from reason
-    try:
+    with writing(name):
         write_atomically(name, data)
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise _check.error(f"cannot write {name!r}: {what}", cv2.Error.StsError) from reason
     return True
 
 
@@ -210,7 +207,7 @@ def as_range_image(array: np.ndarray) -> np.ndarray:
     """What a file holds as a range image of our own; a third axis of length 1 is dropped."""
     if array.ndim == 3 and array.shape[2] == 1:
         array = array[..., 0]
-    if need := _unfit(array):
+    if need := unfit(array):
         raise ValueError(f"it holds an {_check.described(array)}, no range image, which is {need}")
     return _native(array)
 
@@ -220,7 +217,7 @@ def _native(array: np.ndarray) -> np.ndarray:
     return np.require(array, array.dtype.newbyteorder("="), ["C", "W", "A"])
 
 
-def _unfit(array: np.ndarray) -> str | None:
+def unfit(array: np.ndarray) -> str | None:
     """What a range image would be, where `array` is none."""
     integer, real = array.dtype.kind in "ui", array.dtype.kind == "f"
     if array.size == 0:

@@ -8,11 +8,10 @@ from importlib import import_module
 from pathlib import PurePath
 from typing import Any, NamedTuple
 
-import cv2
 import numpy as np
 
 from .._check import array, described, error, fail, public, reals
-from .atomic import write_atomically
+from .atomic import write_atomically, writing
 from .polylines import Line, toLines
 from .source import file_name, opened
 
@@ -105,11 +104,8 @@ def writeLines(
         if value is not None and option not in _FORMATS[suffix].takes:
             raise fail(option, f"None for {suffix}", described(value))
     data = encoded_lines(suffix, lines, **options)
-    try:
+    with writing(name):
         write_atomically(name, data)
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise error(f"cannot write {name!r}: {what}", cv2.Error.StsError) from reason
 
 
 @public

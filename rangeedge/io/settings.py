@@ -1,7 +1,8 @@
 """Settings in YAML, JSON or XML as nested dicts and lists, as far as files of cameras and parameters need them.
 
 Of YAML it reads what calibration tools write: maps by indentation, lists in brackets or by dashes, plain and quoted
-scalars, comments; a tag such as ``!!opencv-matrix`` is passed over. Anchors, block texts and the rest are refused.
+scalars, comments; a tag such as ``!!opencv-matrix`` is passed over. Anchors, block texts and the rest are refused, and
+so is a key that is given twice; elements of XML of the same name are a list.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable
 from typing import Any
 
 _DEPTH = 32  # levels of nesting
@@ -24,10 +26,19 @@ def parse(text: str) -> Any:
         return _from_xml(start)
     if start.startswith(("{", "[")):
         try:
-            return json.loads(_STORED.sub(lambda found: _OF_JSON[found[0]], start))
+            return json.loads(_STORED.sub(lambda found: _OF_JSON[found[0]], start), object_pairs_hook=_map_of)
         except json.JSONDecodeError as reason:
             raise ValueError(f"its JSON is garbled: {reason}") from None
     return _Yaml(text).document()
+
+
+def _map_of(entries: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    for key, value in entries:
+        if key in found:
+            raise ValueError(f"its key {key[:60]!r} is given twice")
+        found[key] = value
+    return found
 
 
 def _from_xml(text: str) -> Any:
@@ -43,10 +54,13 @@ def _from_xml(text: str) -> Any:
 def _of_element(element: ElementTree.Element, depth: int = 0) -> Any:
     if depth > _DEPTH:
         raise ValueError(f"it is nested more than {_DEPTH} levels")
-    if len(element) and all(child.tag == "_" for child in element):  # a list of lists of cv2.FileStorage
-        return [_of_element(child, depth + 1) for child in element]
     if len(element):
-        return {child.tag: _of_element(child, depth + 1) for child in element}
+        found: dict[str, list[Any]] = {}
+        for child in element:
+            found.setdefault(child.tag, []).append(_of_element(child, depth + 1))
+        if found.keys() == {"_"}:  # a list of lists of cv2.FileStorage
+            return found["_"]
+        return {tag: values[0] if len(values) == 1 else values for tag, values in found.items()}
     words = (element.text or "").split()
     return scalar(words[0]) if len(words) == 1 else [scalar(word) for word in words]
 
@@ -98,14 +112,14 @@ class _Yaml:
         return self._map(indentation, depth)
 
     def _map(self, indentation: int, depth: int) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        entries: list[tuple[str, Any]] = []
         while self.at < len(self.lines) and self.lines[self.at][0] == indentation:
             entry = _key_and_rest(self.lines[self.at][1])
             if entry is None:
                 raise self._unreadable()
             self.at += 1
-            found[entry[0]] = self._value(entry[1], indentation, depth)
-        return found
+            entries.append((entry[0], self._value(entry[1], indentation, depth)))
+        return _map_of(entries)
 
     def _list(self, indentation: int, depth: int) -> list[Any]:
         found: list[Any] = []
@@ -220,15 +234,15 @@ class _Flow:
         return found
 
     def _pairs(self, depth: int) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        entries: list[tuple[str, Any]] = []
         while self.tokens[self.at : self.at + 1] != ["}"]:
             key = self._next().strip("'\"")
             if self._next() != ":":
                 raise ValueError(f"the key {key[:60]!r} has no value")
-            found[key] = self._value(depth + 1)
+            entries.append((key, self._value(depth + 1)))
             if self.tokens[self.at : self.at + 1] == [","]:
                 self.at += 1
             elif self.tokens[self.at : self.at + 1] != ["}"]:
                 raise ValueError("a map lacks a comma")
         self.at += 1
-        return found
+        return _map_of(entries)

@@ -42,7 +42,7 @@ def file_name(path: Any, argument: str = "path") -> str:
         name = None
     if name is None:
         raise _check.fail(argument, "a file name (str or path)", type(path).__name__)
-    return os.fsdecode(name)
+    return str(os.fsdecode(name))
 
 
 @contextmanager

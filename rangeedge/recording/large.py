@@ -16,7 +16,7 @@ import numpy as np
 
 from .._check import error
 from ..io import RangeImage
-from ..io.files import as_range_image
+from ..io.files import as_range_image, unfit
 from ..io.source import opened
 from ..io.tiff import Window, images_of_tiff, read_window, size_of_page
 from ..io.tiff_tags import (
@@ -30,7 +30,7 @@ from ..io.tiff_tags import (
     WIDTH,
     Page,
 )
-from .source import FrameSource, extra
+from .source import FrameSource, extra, failures_named
 from .stacks import is_zarr, zarr_array
 
 _TILE = 256  # pixels of a tile of the files that are written
@@ -53,11 +53,12 @@ def open_large(path: str) -> LargeImage:
     """An image of one channel, of any size."""
     if is_zarr(path):
         array, geometry = zarr_array(path)
-        return LargeImage(path, _expect_image(path, array.shape), array.dtype, geometry, None)
+        with failures_named(repr(path)):
+            return LargeImage(path, _expect_image(array), array.dtype, geometry, None)
     with opened(path, math.inf) as (stream, _):
         if stream.read(6) == b"\x93NUMPY":
             array = np.load(path, mmap_mode="r", allow_pickle=False)
-            return LargeImage(path, _expect_image(path, array.shape), array.dtype, {}, None)
+            return LargeImage(path, _expect_image(array), array.dtype, {}, None)
         page = _page(path)
         sized = size_of_page(page)
         shape = (sized.src.shape[0], page.value(WIDTH))
@@ -113,10 +114,11 @@ def write_geotiff(path: Path, array: Any, image: LargeImage, rows: int) -> None:
         temporary.unlink(missing_ok=True)
 
 
-def _expect_image(path: str, shape: tuple[int, ...]) -> tuple[int, int]:
-    if len(shape) != 2:
-        raise error(f"{path!r} holds an array of shape {shape}, no image (H, W) that could be done in blocks")
-    rows, cols = shape
+def _expect_image(array: Any) -> tuple[int, int]:
+    need = unfit(array) if len(array.shape) == 2 else "of shape (H, W)"
+    if need:
+        raise ValueError(f"it holds an array of {array.dtype} of shape {array.shape}; images done in blocks are {need}")
+    rows, cols = array.shape
     return rows, cols
 
 

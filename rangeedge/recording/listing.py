@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import os
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 from .._check import described, error, fail, public
 from ..io.source import file_name
 from .bags import bag_frames, is_bag
+from .manifest import MANIFEST
 from .sequences import file_frame, folder_files, is_tum, seen_by, tum_frames
 from .source import FrameSource, Unreadable
 from .stacks import is_zarr, stack_frames
@@ -22,7 +23,7 @@ from .stacks import is_zarr, stack_frames
 def framesOf(
     inputs: str | os.PathLike[str] | FrameSource | Iterable[str | os.PathLike[str] | FrameSource],
     *,
-    topics: Sequence[str] = (),
+    topics: Iterable[str] = (),
     calibration: int | None = None,
 ) -> list[FrameSource]:
     """List the frames of recordings, without reading them.
@@ -37,7 +38,7 @@ def framesOf(
         of many pages; a sequence of the TUM RGB-D benchmark, a folder with ``depth.txt``; with the extra ``[bags]`` a
         bag of ROS 1 or 2 or an MCAP file, with depth images (16UC1, 32FC1, compressedDepth) or organized PointCloud2.
         Frames that have been listed are taken as they are: ``framesOf("walk.bag")[::10]``.
-    topics : sequence of str
+    topics : iterable of str
         Those of a bag that are taken; by default all with depths, one a camera.
     calibration : {1, 2}, optional
         Of an ABW scanner, as for `imreadRange`.
@@ -73,11 +74,15 @@ def framesOf(
         inputs = [inputs]
     if isinstance(inputs, bytes) or not isinstance(inputs, Iterable):
         raise fail("inputs", "a path or an iterable of paths", described(inputs))
+    names = tuple(topics) if isinstance(topics, Iterable) and not isinstance(topics, (str, bytes)) else (None,)
+    if not all(isinstance(name, str) for name in names):
+        raise fail("topics", "an iterable of the names of topics", described(topics))
+    topics = tuple(map(str, names))
     options: dict[str, Any] = {} if calibration is None else {"calibration": calibration}
     frames = [
         frame
         for given in inputs
-        for frame in ([given] if isinstance(given, FrameSource) else _listed(given, tuple(topics), options))
+        for frame in ([given] if isinstance(given, FrameSource) else _listed(given, topics, options))
     ]
     if topics and not any(is_bag(Path(frame.path)) for frame in frames):
         raise error(f"`topics` = {', '.join(topics)}, but no input is a bag or MCAP file")
@@ -112,7 +117,8 @@ def _frames(path: str, topics: tuple[str, ...], options: dict[str, Any]) -> list
             raise
         if topics and bag:
             raise
-        return [FrameSource(_stem(path), path, "", Unreadable(str(getattr(problem, "err", problem))))]
+        reason = problem.err if isinstance(problem, error) else f"cannot read {path!r}: {problem}"
+        return [FrameSource(_stem(path), path, "", Unreadable(reason))]
     return found or [file_frame(path, _stem(path), **options)]
 
 
@@ -137,15 +143,18 @@ def _stem(path: str) -> str:
 def _named_apart(frames: list[FrameSource]) -> list[FrameSource]:
     """Frames of unique names: those that collide keep their suffix, then as much of their folder as it takes.
 
-    The name of one is not that of the folder of others either, whose results would be among its own.
+    The name of one is not that of the folder of others either, whose results would be among its own, nor that of the
+    manifest.
     """
-    places = Counter((os.path.abspath(frame.path), frame.part) for frame in frames)
+    paths = [_absolute(frame.path) for frame in frames]
+    places = Counter((path, frame.part) for path, frame in zip(paths, frames, strict=True))
     twice = next((path for (path, _), count in places.items() if count > 1), None)
     if twice is not None:
         raise error(f"{twice!r} is given twice")
-    folders = [Path(os.path.abspath(frame.path)).parent.parts[1:] for frame in frames]
+    folders = [Path(path).parent.parts[1:] for path in paths]
     beside = Counter((folder, frame.name) for folder, frame in zip(folders, frames, strict=True))
     above = {"/".join(parts[:end]) for parts in (f.name.split("/") for f in frames) for end in range(1, len(parts))}
+    above.add(MANIFEST)
     short = [
         _with_suffix(frame) if beside[folder, frame.name] > 1 or frame.name in above else frame.name
         for folder, frame in zip(folders, frames, strict=True)
@@ -163,6 +172,13 @@ def _named_apart(frames: list[FrameSource]) -> list[FrameSource]:
         if not all(part.strip(".") for part in name.split("/")):
             raise error(f"{frame.title!r} has no name for a file of its results: {name!r}")
     return [replace(frame, name=name) for frame, name in zip(frames, names, strict=True)]
+
+
+def _absolute(path: str) -> str:
+    try:
+        return os.path.abspath(path)
+    except OSError as reason:  # the current folder has been removed
+        raise error(f"cannot read {path!r}: {reason.strerror}") from reason
 
 
 def _with_suffix(frame: FrameSource) -> str:

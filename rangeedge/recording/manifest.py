@@ -9,31 +9,39 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
+import math
 import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import cv2
-
 from .._check import error
-from ..io.atomic import write_atomically
+from ..io.atomic import write_atomically, writing
+from ..io.source import opened
 
 Line = dict[str, Any]
+MANIFEST = "manifest.jsonl"
 
 
 def read_lines(path: Path) -> dict[str, Line]:
     """The lines of a manifest by the names of frames. One that was cut off, at the end, is none."""
     found: dict[str, Line] = {}
-    try:
-        text = path.read_text("utf-8", "replace")
-    except FileNotFoundError:
+    if not path.exists():
         return found
-    for line in text.splitlines():
-        with contextlib.suppress(ValueError, KeyError, TypeError, RecursionError):
-            entry = json.loads(line)
-            found[entry["frame"]] = entry
+    with opened(str(path), math.inf) as (stream, _):
+        for line in stream:
+            with contextlib.suppress(ValueError, KeyError, TypeError, RecursionError):
+                entry = json.loads(line, parse_float=_finite, parse_constant=_finite)
+                found[entry["frame"]] = entry
     return found
+
+
+def _finite(text: str) -> float:
+    """A number; a line that holds another was not written here."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError(text)
+    return value
 
 
 class Manifest:
@@ -48,16 +56,17 @@ class Manifest:
         """Locks the manifest and reads it; the lock ends with the process, however that ends."""
         import fcntl
 
-        with _named(self.path):
+        with writing(self.path, "cannot write to"):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             lock = os.open(self.path.with_name(f".{self.path.name}.lock"), os.O_RDWR | os.O_CREAT, 0o666)
         try:
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise error(
-                    f"another run is writing to {str(self.path.parent)!r}; wait for it, or give another `out`"
-                ) from None
+            with writing(self.path, "cannot lock"):
+                try:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    raise error(
+                        f"another run is writing to {str(self.path.parent)!r}; wait for it, or give another `out`"
+                    ) from None
             self.lines = read_lines(self.path)
             yield self
         finally:
@@ -66,12 +75,12 @@ class Manifest:
     def keep(self, names: set[str]) -> None:
         """Leave only the lines of these frames, in the file; none in memory."""
         kept, self.lines = (line for name, line in self.lines.items() if name in names), {}
-        with _named(self.path):
+        with writing(self.path, "cannot write to"):
             write_atomically(self.path, b"".join(map(_encoded, kept)))
 
     def append(self, line: Line) -> None:
         """Add a line, in one piece or not at all."""
-        with _named(self.path):
+        with writing(self.path, "cannot write to"):
             descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND)
             try:
                 before = os.fstat(descriptor).st_size
@@ -90,27 +99,19 @@ def _encoded(line: Mapping[str, Any]) -> bytes:
     return json.dumps(line, allow_nan=False).encode() + b"\n"
 
 
-@contextlib.contextmanager
-def _named(path: Path) -> Iterator[None]:
-    """What cannot be written is an error that names the file."""
+def state_of(path: str) -> Line:
+    """What tells whether a file was changed: its time in nanoseconds, and its size in bytes."""
     try:
-        yield
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise error(f"cannot write to {str(path)!r}: {what}", cv2.Error.StsError) from reason
-
-
-def changed(path: str) -> int | None:
-    """When a file was changed, in nanoseconds."""
-    try:
-        return os.stat(path).st_mtime_ns
-    except OSError:
-        return None
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return {"modified": None, "bytes": None}
+    return {"modified": found.st_mtime_ns, "bytes": found.st_size}
 
 
 def complete(root: Path, line: Line) -> bool:
     """Whether the files of a line are there, as long as they were."""
     try:
-        return all((root / name).stat().st_size == size for name, size in line["outputs"].items())
+        outputs = line["outputs"].items()
+        return bool(outputs) and all((root / name).stat().st_size == size for name, size in outputs)
     except (OSError, KeyError, AttributeError, TypeError):
         return False

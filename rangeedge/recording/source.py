@@ -93,12 +93,13 @@ def kept(files: int) -> Callable[[Callable[[str], _R]], Callable[[str], _R]]:
 
     def keeping(function: Callable[[str], _R]) -> Callable[[str], _R]:
         @functools.lru_cache(maxsize=files)
-        def of_state(path: str, modified: int) -> _R:
+        def of_state(path: str, *state: int) -> _R:
             return function(path)
 
         @functools.wraps(function)
         def call(path: str) -> _R:
-            return of_state(path, os.stat(path).st_mtime_ns)
+            found = os.stat(path)
+            return of_state(path, found.st_mtime_ns, found.st_size, found.st_ino)
 
         return call
 

@@ -14,7 +14,7 @@ import numpy as np
 from ..io import RangeImage
 from ..io.arrays import source_name
 from ..io.files import as_range_image
-from ..io.source import expect_pixels, opened
+from ..io.source import FILE_LIMIT, expect_pixels, opened
 from ..io.tiff import images_of_tiff, read_page
 from ..io.tiff_tags import Page
 from .archives import npz_stack
@@ -67,6 +67,7 @@ def _frames(shape: tuple[int, ...], dtype: np.dtype) -> int:
     if len(shape) in (3, 4) and shape[0] > _MOST:
         raise ValueError(f"it holds {shape[0]} frames, more than the {_MOST} that are listed of a file")
     if len(shape) == 4 or (len(shape) == 3 and not (dtype.kind == "f" and shape[2] in (1, 3, 4))):
+        expect_pixels(*shape[1:3])
         return shape[0]
     return 0
 
@@ -117,6 +118,8 @@ def zarr_array(path: str) -> tuple[Any, Mapping[str, Any]]:
         if hasattr(found, "array_keys"):
             found = found[source_name(sorted(found.array_keys()))]
             attributes |= dict(found.attrs)
+        if (size := math.prod(found.chunks) * found.dtype.itemsize) > FILE_LIMIT:
+            raise ValueError(f"its chunks have {size} bytes each, more than the {FILE_LIMIT} that are unpacked")
         return found, {key: attributes[key] for key in _GEOMETRY if key in attributes}
 
 

@@ -7,17 +7,15 @@ whether they are still as they were.
 from __future__ import annotations
 
 import io
-import os
 import zipfile
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import cv2
 import numpy as np
 
 from .._check import error, public
-from ..io.atomic import write_atomically
+from ..io.atomic import write_atomically, writing
 from ..io.tiff import Window
 from .source import FrameSource, extra
 
@@ -30,12 +28,9 @@ FORMS = ("folder", "npz", "png", "zarr")
 def write_file(root: Path, name: str, data: bytes) -> Outputs:
     """A file of a frame, in the folders that its name has."""
     path = root / name
-    try:
+    with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         write_atomically(path, data)
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise error(f"cannot write {os.fspath(path)!r}: {what}", cv2.Error.StsError) from reason
     return {name: len(data)}
 
 
@@ -89,15 +84,13 @@ def open_arrays(root: Path, mode: str = "r+") -> Any:
 
 def prepare_arrays(root: Path, arrays: Mapping[str, tuple[str, Shape, Shape]], fresh: bool) -> None:
     """Make room in a store, for arrays of a type, a shape and chunks; what is there stays where it is not `fresh`."""
-    try:
+    with writing(root, "cannot write to"):
         group = open_arrays(root, "a")
         for name, (kind, shape, chunks) in arrays.items():
             if fresh or name not in group:
                 group.create_array(name, shape=shape, chunks=chunks, dtype=kind, fill_value=0, overwrite=True)
             else:
                 group[name].resize(shape)
-    except OSError as reason:
-        raise error(f"cannot write to {str(root)!r}: {reason.strerror or reason}", cv2.Error.StsError) from reason
 
 
 def write_chunks(root: Path, index: int, arrays: Mapping[str, np.ndarray]) -> Outputs:

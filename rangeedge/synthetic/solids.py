@@ -46,7 +46,7 @@ def _revolution(center: np.ndarray, axis: np.ndarray, flattening: float, radius:
     quadric = np.empty((4, 4))
     quadric[:3, :3] = np.eye(3) - flattening * np.outer(axis, axis)
     quadric[:3, 3] = quadric[3, :3] = -quadric[:3, :3] @ center
-    quadric[3, 3] = center @ quadric[:3, :3] @ center - radius**2
+    quadric[3, 3] = center @ quadric[:3, :3] @ center - radius * radius
     return quadric
 
 
@@ -123,7 +123,7 @@ def cast(scene: Sequence[Solid], rays: Rays) -> tuple[np.ndarray, np.ndarray]:
         if np.isfinite(solid.radius):
             c = solid.center
             distance = c @ c - 2 * (origins @ c) + o_o - (directions @ c - o_d) ** 2 / d_d
-            near = np.flatnonzero(distance <= solid.radius**2 * (1 + _ON_FACE))
+            near = np.flatnonzero(distance <= solid.radius * solid.radius * (1 + _ON_FACE))
         subset, so_far, seen = (origins[near], directions[near]), nearest[near], faces[near]
         for face in solid.faces:
             hits = hit(face, subset, so_far)
@@ -260,7 +260,8 @@ def cone(apex: Vector, axis: Vector, radius: float, height: float) -> Solid:
     apex, axis = vector("apex", apex), unit_vector("axis", axis)
     radius = _check.number("radius", radius, 0, above=True)
     height = _check.number("height", height, 0, above=True)
-    mantle = _revolution(apex, axis, 1 + (radius / height) ** 2, 0.0)
+    slope = radius / height
+    mantle = _revolution(apex, axis, 1 + slope * slope, 0.0)
     base, tip = half_space(axis, apex + axis * height), half_space(-axis, apex)
     faces = (Face(mantle, (base, tip)), Face(base, (mantle,)))
     return Solid(faces, apex + axis * height / 2, float(np.hypot(radius, height / 2)))

@@ -4,6 +4,16 @@
 
 namespace rangeedge::python {
 
+namespace {
+
+// What the module registers with Python is one for the process; so, too, are NumPy and cv2.
+void expect_main_interpreter() {
+    if (PyInterpreterState_GetID(PyInterpreterState_Get()) != 0)
+        throw nanobind::import_error("rangeedge works in the main interpreter of a process alone, in no other");
+}
+
+}  // namespace
+
 void bind_cancellation(nanobind::module_& m);
 void bind_image(nanobind::module_& m);
 void bind_edges(nanobind::module_& m);
@@ -18,6 +28,7 @@ void bind_io(nanobind::module_& m);
 }  // namespace rangeedge::python
 
 NB_MODULE(_core, m) {
+    rangeedge::python::expect_main_interpreter();
     m.doc() = "The compiled kernels. Arrays are C-contiguous; outputs are written in place.";
     rangeedge::python::bind_cancellation(m);
     rangeedge::python::bind_image(m);
