@@ -25,6 +25,7 @@ from .. import _core
 
 _PATIENCE = 0.05  # seconds between questions whether the wait is given up
 _AHEAD = 3  # tasks a worker that are in flight: one at work, one waiting, one whose result waits for those before
+_MOST_ON_WINDOWS = 61  # processes that can be waited for together
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 
 
@@ -120,9 +121,16 @@ def _alone(call: Callable[[Any], Any], task: Any, future: Future[Outcome]) -> Ou
 
 
 def _pool(jobs: int) -> ProcessPoolExecutor:
-    """Workers that are made by a server: a copy of a process with threads, as OpenCV starts them, may hang."""
-    context = multiprocessing.get_context("forkserver")
-    context.set_forkserver_preload([__name__, "rangeedge.app.results"])
+    """Workers that are made by a server: a copy of a process with threads, as OpenCV starts them, may hang.
+
+    Windows has no such server: there each begins anew.
+    """
+    served = "forkserver" in multiprocessing.get_all_start_methods()
+    context = multiprocessing.get_context("forkserver" if served else "spawn")
+    if served:
+        context.set_forkserver_preload([__name__, "rangeedge.app.results"])
+    else:
+        jobs = min(jobs, _MOST_ON_WINDOWS)
     threads = max(1, (os.cpu_count() or 1) // jobs)
     return ProcessPoolExecutor(jobs, context, _begin, (threads,))
 
