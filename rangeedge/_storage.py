@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 from collections.abc import Mapping
@@ -14,17 +15,22 @@ import numpy as np
 
 from ._check import described, error, fail
 from .io.atomic import write_atomically
+from .io.settings import parse
+from .io.source import file_name, opened
 from .noise_model import NoiseModel
 from .options import DETECTION
 
 _SUFFIXES = (".xml", ".yml", ".yaml", ".json")  # by which cv2.FileStorage knows the format
 # The first and the last key of a file that `save` has written: YAML that has lost its end is YAML again.
 _OPENING, _CLOSING = "savedBy", "complete"
+_FILE_BYTES = 2**28
+_DEPTH = 32  # levels of nesting
+_KINDS = {"u": "u1", "c": "i1", "w": "u2", "s": "i2", "i": "i4", "f": "f4", "d": "f8", "h": "f2"}  # by OpenCV's letters
 
 
 def save(filename: str | os.PathLike[str], node: str, values: Mapping[str, Any]) -> None:
     """Write values into a file, as the node of that name; all of it or nothing."""
-    name = _file_name(filename)
+    name = file_name(filename, "filename")
     suffix = Path(name).suffix.lower()
     if suffix not in _SUFFIXES:
         raise fail("filename", f"a file name with one of the suffixes {' '.join(_SUFFIXES)}", repr(name))
@@ -40,33 +46,47 @@ def save(filename: str | os.PathLike[str], node: str, values: Mapping[str, Any])
 
 
 def load(filename: str | os.PathLike[str], node: str) -> tuple[str, dict[str, Any]]:
-    """The name of a file, and the values under the node of that name in it."""
-    name = _file_name(filename)
+    """The name of a file, and the values under the node of that name in it.
+
+    By our own reader: that of OpenCV does not survive every file that is garbled.
+    """
+    name = file_name(filename, "filename")
+    with opened(name) as (stream, size):
+        if size > _FILE_BYTES:
+            raise ValueError(f"it has {size} bytes, more than parameters")
+        tree = parse(stream.read(size).decode())
+        found = tree.get(node) if isinstance(tree, dict) else None
+        if not isinstance(found, dict):
+            raise ValueError(f"it holds no `{node}`")
+        if _OPENING in tree and tree.get(_CLOSING) != 1:
+            raise ValueError("it is not complete")
     try:
-        text = Path(name).read_text("utf-8")
-    except (OSError, ValueError) as reason:
-        what = getattr(reason, "strerror", None) or reason
-        raise error(f"cannot read {name!r}: {what}", cv2.Error.StsObjectNotFound) from reason
-    # OpenCV 4.8 does not survive all files that have lost their end.
-    if node not in text:
-        raise error(f"{name!r} holds no `{node}`", cv2.Error.StsParseError)
-    if _OPENING in text and _CLOSING not in text:
-        raise error(f"{name!r} is not complete", cv2.Error.StsParseError)
-    fs = cv2.FileStorage()
-    try:
-        fs.open(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
-        found = fs.getNode(node)
-        whole = fs.getNode(_OPENING).empty() or fs.getNode(_CLOSING).real() == 1
-    except cv2.error as problem:
-        raise error(f"cannot read {name!r}: {problem.err}", cv2.Error.StsParseError) from problem
-    if not found.isMap():
-        raise error(f"{name!r} holds no `{node}`", cv2.Error.StsParseError)
-    if not whole:
-        raise error(f"{name!r} is not complete", cv2.Error.StsParseError)
-    try:
-        return name, read(found)
+        return name, _typed({key: _tree_value(key, value) for key, value in found.items()})
     except error as problem:
         raise error(f"{name!r}: {problem.err}", problem.code) from None
+
+
+def _tree_value(name: str, value: Any) -> Any:
+    """What `_write_node` has written, from nested dicts and lists."""
+    if isinstance(value, dict):
+        if "dt" in value:
+            return _matrix(name, value)
+        return {key: _tree_value(key, item) for key, item in value.items()}
+    return tuple(_tree_value(name, item) for item in value) if isinstance(value, list) else value
+
+
+def _matrix(name: str, stored: Mapping[str, Any]) -> np.ndarray:
+    """An array of `cv2.FileStorage`: its size, the type of its elements, which may have channels, and these."""
+    try:
+        sizes = np.array(stored["sizes"] if "sizes" in stored else [stored["rows"], stored["cols"]]).ravel().tolist()
+        channels, kind = re.fullmatch(r"(\d{0,3})([a-z])", str(stored["dt"])).groups()  # type: ignore[union-attr]
+        values = np.array(stored["data"], _KINDS[kind]).ravel()
+        shape = (*sizes, int(channels)) if channels not in ("", "1") else tuple(sizes)
+        if math.prod(shape) != len(values) or min(shape, default=0) < 0:
+            raise ValueError(f"it has {len(values)} elements")
+        return values.reshape(shape)
+    except (AttributeError, KeyError, OverflowError, TypeError, ValueError) as reason:
+        raise error(f"`{name}` is a damaged matrix: {reason}", cv2.Error.StsParseError) from reason
 
 
 def write(fs: cv2.FileStorage, node: str, values: Mapping[str, Any]) -> None:
@@ -83,7 +103,11 @@ def write(fs: cv2.FileStorage, node: str, values: Mapping[str, Any]) -> None:
 
 def read(node: cv2.FileNode) -> dict[str, Any]:
     """The values under a node, in the types of Python."""
-    values = {name: _node_value(node.getNode(name)) for name in node.keys()}  # noqa: SIM118
+    return _typed({name: _node_value(node.getNode(name)) for name in node.keys()})  # noqa: SIM118
+
+
+def _typed(values: dict[str, Any]) -> dict[str, Any]:
+    """Values as options have them."""
     for name, option in DETECTION.items():  # a file storage knows no bool
         if isinstance(option.default, bool) and isinstance(values.get(name), int) and values[name] in (0, 1):
             values[name] = bool(values[name])
@@ -93,12 +117,6 @@ def read(node: cv2.FileNode) -> dict[str, Any]:
         except TypeError:
             raise fail("noise", "a number, an array, or what a NoiseModel holds", values["noise"]) from None
     return values
-
-
-def _file_name(filename: Any) -> str:
-    if not isinstance(filename, (str, os.PathLike)):
-        raise fail("filename", "a file name", type(filename).__name__)
-    return os.fsdecode(filename)
 
 
 def _write_node(fs: cv2.FileStorage, name: str, value: Any) -> None:
@@ -119,14 +137,16 @@ def _write_node(fs: cv2.FileStorage, name: str, value: Any) -> None:
         fs.write(name, float(value))
 
 
-def _node_value(node: cv2.FileNode) -> Any:
+def _node_value(node: cv2.FileNode, depth: int = 0) -> Any:
     """What `_write_node` has written, in the types of Python."""
+    if depth > _DEPTH:
+        raise error(f"it is nested more than {_DEPTH} levels", cv2.Error.StsParseError)
     if node.isInt():
         return int(node.real())
     if node.isReal():
         return node.real()
     if node.isSeq():
-        return tuple(_node_value(node.at(i)) for i in range(node.size()))
+        return tuple(_node_value(node.at(i), depth + 1) for i in range(node.size()))
     if not node.isMap():
         return node.string() if node.isString() else None
     keys = node.keys()
@@ -135,4 +155,4 @@ def _node_value(node: cv2.FileNode) -> Any:
             return node.mat()
         except cv2.error as problem:
             raise error(f"`{node.name()}` is a damaged matrix: {problem.err}", problem.code) from problem
-    return {key: _node_value(node.getNode(key)) for key in keys}
+    return {key: _node_value(node.getNode(key), depth + 1) for key in keys}

@@ -10,7 +10,7 @@ import numpy as np
 from . import _core
 from ._option import parsed, takes
 from .constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
-from .detector import selected, thin_lines
+from .detection import selected, thin_lines
 from .edges import EdgeStrength, kernel_options, kindNames, no_strength
 from .frame import Frame
 from .noise import measured_frame

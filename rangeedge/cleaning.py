@@ -12,7 +12,7 @@ from . import _core
 from ._check import image8, labels32s
 from ._option import parsed, takes
 from .constants import CLEAN_FILLED, CLEAN_REMOVED, CLEAN_SMOOTHED
-from .detector import selected, thin_lines
+from .detection import selected, thin_lines
 from .edges import kernel_options, no_strength
 from .flying import keep_limbs
 from .forms import range_array

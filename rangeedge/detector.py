@@ -14,14 +14,10 @@ from . import _storage
 from ._check import deliver, described, error, fail, public
 from ._option import parsed, takes
 from ._typed import Accessors
+from .detection import run_detector
 from .edges import EdgeStrength, measure_points, measure_strength
-from .frame import Frame
 from .noise import measured_frame
 from .options import DETECTION, SELECTION, ScanLineParams, Selection
-from .plausible import warn_of_angle, warn_of_thresholds
-from .sectors import around
-from .selection import select_strength
-from .thinning import thinEdges
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -150,24 +146,6 @@ def detectEdgesWithStrength(
     given = {"jumpThreshold": jumpThreshold, "creaseThreshold": creaseThreshold, "eps": eps, **options}
     params, selection = parsed(given, ScanLineParams, Selection)
     return run_detector(measured_frame(src, params, mask), params, selection)
-
-
-def run_detector(frame: Frame, params: ScanLineParams, selection: Selection) -> tuple[np.ndarray, EdgeStrength]:
-    """The edges of a checked range image: strengths, those of them that count, and their middle lines."""
-    warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
-    warn_of_angle(selection.creaseThreshold)
-    strength = measure_strength(frame, params)
-    return thin_lines(frame, selected(frame, strength, selection.of(params))), strength
-
-
-def selected(frame: Frame, strength: EdgeStrength, selection: Selection) -> np.ndarray:
-    """The strengths of a range image that count, as a map."""
-    return around(frame, lambda *maps, wrap: select_strength(EdgeStrength(*maps), selection, wrap), *strength)
-
-
-def thin_lines(frame: Frame, edges: np.ndarray) -> np.ndarray:
-    """The middle lines of an edge map of a range image."""
-    return around(frame, thinEdges, edges)
 
 
 @public

@@ -30,6 +30,7 @@ KINDS = {
     "concave": EDGE_CONCAVE,
     "boundary": EDGE_BOUNDARY,
 }
+_IN_WORDS = {"occluding": "nearer side", "occluded": "farther side", "boundary": "beside no data"}  # others as they are
 _POINT = [("x", "f4"), ("y", "f4"), ("jump", "f4"), ("crease", "f4")]
 _POINT += [("kind", "u1"), ("significance", "f4"), ("direction", "u1")]
 
@@ -87,6 +88,11 @@ def kindNames(kind: int) -> str:
     """
     kind = integer("kind", kind, 0, sum(KINDS.values()))
     return " ".join(name for name, bit in KINDS.items() if kind & bit) or "none"
+
+
+def kind_in_words(kind: int) -> str:
+    """A kind of edge as sentences and pictures have it."""
+    return ", ".join(_IN_WORDS.get(name, name) for name, bit in KINDS.items() if kind & bit) or "no edge"
 
 
 @public

@@ -56,6 +56,11 @@ class Frame:
         return self.samples.shape[:2]
 
     @property
+    def unit(self) -> str:
+        """Of lengths, where it is known: integers and `depthFactor` 1000 are millimetres, lengths metres then."""
+        return "m" if self.step == 1 / 1000 else ""
+
+    @property
     def threads(self) -> int:
         """How many threads the image is worth."""
         return threads_worth(self.shape[0] * self.shape[1])
@@ -93,19 +98,22 @@ class Frame:
         """Distance along the viewing axis, NaN where invalid."""
         return 1 / self.ordinate if self.projective else -self.ordinate
 
-    @property
+    @cached_property
     def points(self) -> np.ndarray:
         """(H, W, 3) coordinates of every pixel, NaN where invalid."""
         if self.samples.ndim == 3:
             return self.samples + np.asarray(self.origin, np.float64)
-        v, u = np.indices(self.shape)
+        v, u = np.indices(self.shape, sparse=True)
         a, b, c, d, e, f = self.to_plane
-        x, y = a * u + b * v + c, d * u + e * v + f
-        if not self.projective:
-            return np.stack([x, y, self.ordinate if self.heightMap else -self.ordinate], axis=-1)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            z = 1 / self.ordinate.astype(np.float64)
-        return np.stack([x * z, y * z, z], axis=-1)
+        points = np.empty((*self.shape, 3))
+        points[..., 0], points[..., 1] = a * u + b * v + c, d * u + e * v + f
+        if self.projective:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                points[..., 2] = 1 / self.ordinate.astype(np.float64)
+            points[..., :2] *= points[..., 2:]
+        else:
+            points[..., 2] = self.ordinate if self.heightMap else -self.ordinate
+        return points
 
     def toward_viewer(self, points: np.ndarray) -> np.ndarray:
         """The directions toward the viewer from points (..., 3)."""

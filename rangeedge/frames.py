@@ -105,8 +105,9 @@ def outcomes_of(
         from .recording.cluster import run_dask
 
         return run_dask(call, tasks, client, batch)
-    from .recording.workers import run_here, run_local
+    from .recording.workers import expect_guard, run_here, run_local
 
+    expect_guard(jobs)
     return run_here(call, tasks) if jobs == 1 else run_local(call, tasks, jobs)
 
 

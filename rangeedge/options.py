@@ -1,22 +1,24 @@
-"""Every option, once: its default, its check, what it means, and how the command line spells it.
+"""The options of the detector, each once: its default, its check, what it means, how the command line spells it.
 
 A class of options is a frozen dataclass, whose fields are made by `option`; it checks its values when it is made, and
 keeps each in its own type. From it come the keywords of the functions (`takes`), their signatures and documentation,
 the accessors of the detector and the types of all of them (`_typed.py`, which ``python tests/typed.py`` writes), the
-flags of the command line, and what a detector saves: every field of `ScanLineParams` and of `Selection`.
+flags of the command line, and what a detector saves: every field of `ScanLineParams` and of `Selection`. The options
+of the stages after it are in `stage_options`; at the end are the families that functions take.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _check, _parse
-from ._option import Check, Option, Options, declared, option
+from ._option import Option, Options, declared, option
+from ._option_checks import camera, distortion, noise_value, one_of, or_none, real, whole
 from .constants import (
     CREASE_MAX,
     CREASE_NORMAL,
@@ -27,64 +29,13 @@ from .constants import (
     MEASURE_MIDPOINT,
 )
 from .noise_model import NoiseModel
+from .stage_options import Cleaning, Closing, Growing, Linking, Seeding
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
 
-def _real(low: float = -np.inf, high: float = np.inf, *, above: bool = False) -> Check:
-    return lambda name, value: _check.number(name, value, low, high, above=above)
-
-
-def _whole(low: int, high: int = 2**31 - 1) -> Check:
-    return lambda name, value: _check.integer(name, value, low, high)
-
-
-def _or_none(check: Check) -> Check:
-    return lambda name, value: None if value is None else check(name, value)
-
-
-def _one_of(constants: Mapping[str, int]) -> Check:
-    return lambda name, value: _check.flag(name, value, constants)
-
-
-def _camera(name: str, value: Any) -> np.ndarray:
-    return _read_only(_check.camera_matrix(name, value))
-
-
-def _distortion(name: str, value: Any) -> np.ndarray:
-    return _read_only(_check.distortion(name, value))
-
-
-def _noise(name: str, value: Any) -> NoiseModel | float | np.ndarray:
-    """A model, a number, or a copy of a map; whether it fits the image shows when that is there."""
-    if isinstance(value, NoiseModel):
-        return value
-    if not isinstance(value, np.ndarray):
-        if isinstance(value, str) or callable(value):
-            model = "a NoiseModel, such as NoiseModel.kinect1()"
-            raise _check.fail(name, f"a number, {model}, or a real array of shape (H, W)", _check.described(value))
-        return _check.number(name, value, 0, above=True)
-    expected = "a number, a NoiseModel, or a real array of shape (H, W)"
-    value = _check.array(name, value, expected)
-    if value.dtype.kind == "b":
-        raise _check.fail(name, expected, _check.described(value))
-    return _read_only(value.astype(np.float32, order="C"))
-
-
-def _read_only(values: np.ndarray) -> np.ndarray:
-    values.setflags(write=False)
-    return values
-
-
-def _below_one(name: str, value: Any) -> float:
-    value = _check.number(name, value, 0, 1, above=True)
-    if value == 1:
-        raise _check.fail(name, "below 1", _check.described(value))
-    return value
-
-
-LINE_SIGNIFICANCE = 20.0  # of lines of candidates that are significant
+_LINE_SIGNIFICANCE = 20.0  # of lines of candidates that are significant
 FITS = {"FIT_LSQ": FIT_LSQ, "FIT_INTERP": FIT_INTERP}
 MEASURES = {"MEASURE_MIDPOINT": MEASURE_MIDPOINT, "MEASURE_ENDPOINT": MEASURE_ENDPOINT}
 CREASES = {"CREASE_MAX": CREASE_MAX, "CREASE_NORMAL": CREASE_NORMAL}
@@ -130,7 +81,7 @@ class ScanLineParams(Options):
 
     eps: float | None = option(
         None,
-        _or_none(_real(0, above=True)),
+        or_none(real(0, above=True)),
         "float or None",
         "Splitting tolerance as a length, at the pixel's depth with a camera (paper, 4.1). None: `epsFactor` times the"
         " noise.",
@@ -138,14 +89,14 @@ class ScanLineParams(Options):
     )
     epsFactor: float = option(
         3.5,
-        _real(0, above=True),
+        real(0, above=True),
         "float",
         "Splitting tolerance in standard deviations of the noise.",
         group="scan lines",
     )
     K: ArrayLike | str | os.PathLike[str] | None = option(
         None,
-        _or_none(_camera),
+        or_none(camera),
         "array_like or path or None",
         "Camera; the values of `src` are then depths along the optical axis. (fx, fy, cx, cy), 3x3, 3x4, 9 numbers by"
         " rows, or the name of a file of one (YAML, JSON or XML of cv2, ROS, Open3D or librealsense, text, NPY, NPZ),"
@@ -158,7 +109,7 @@ class ScanLineParams(Options):
     )
     distCoeffs: ArrayLike | None = option(
         None,
-        _or_none(_distortion),
+        or_none(distortion),
         "array_like of 4, 5, 8, 12 or 14 numbers or None",
         "Distortion of the lens with `K`, as cv2 has it: (k1, k2, p1, p2[, k3[, k4, k5, k6[, ...]]]).",
         group="geometry",
@@ -169,7 +120,7 @@ class ScanLineParams(Options):
     )
     imageSize: Sequence[int] | None = option(
         None,
-        _or_none(_check.image_size),
+        or_none(_check.image_size),
         "(int, int) or None",
         "Width and height of the images that `K` holds for: others, resized or cropped, are refused. None: that of the"
         " camera's file, where it tells one.",
@@ -181,7 +132,7 @@ class ScanLineParams(Options):
     )
     pixelSize: float | Sequence[float] | None = option(
         None,
-        _or_none(_check.pixel_size),
+        or_none(_check.pixel_size),
         "float or (float, float) or None",
         "Spacing (dx, dy) of a regular grid in the unit of its values; None is 1.",
         group="geometry",
@@ -200,14 +151,14 @@ class ScanLineParams(Options):
     )
     depthFactor: float = option(
         1000.0,
-        _real(0, above=True),
+        real(0, above=True),
         "float",
         "Divides integer values: 1000 makes metres of millimetres. Integer 0 is invalid.",
         group="geometry",
     )
     invalid: float | Sequence[float | Sequence[float]] | None = option(
         None,
-        _or_none(_check.invalid_values),
+        or_none(_check.invalid_values),
         "float or sequence of floats and pairs or None",
         "What `src` holds where there is no data, as stored there: a value; several, (0, 65535); and ranges, which are"
         " pairs among them with both ends included: [(8, inf)] leaves out 8 and more, [-9999, (8, inf)] both."
@@ -221,7 +172,7 @@ class ScanLineParams(Options):
     )
     origin: Sequence[float] | None = option(
         None,
-        _or_none(_check.point),
+        or_none(_check.point),
         "(float, float, float) or None",
         "Where points were seen from, in their own frame. None: (0, 0, 0) where their rays meet there, else the place"
         " that the rows and columns tell.",
@@ -233,7 +184,7 @@ class ScanLineParams(Options):
     )
     noise: NoiseModel | float | np.ndarray | None = option(
         None,
-        _or_none(_noise),
+        or_none(noise_value),
         "NoiseModel or float or ndarray of shape (H, W) or None",
         "Standard deviation of the values as lengths; None estimates it from the image (`estimateNoise`).",
         group="noise",
@@ -244,7 +195,7 @@ class ScanLineParams(Options):
     )
     directions: int = option(
         DIR_ALL,
-        _whole(1, DIR_ALL),
+        whole(1, DIR_ALL),
         "int",
         "Scan lines to use: DIR_ROWS, DIR_COLS, DIR_DIAG45, DIR_DIAG135 combined by `|`, or DIR_ALL.",
         group="scan lines",
@@ -254,7 +205,7 @@ class ScanLineParams(Options):
     )
     fit: int = option(
         FIT_LSQ,
-        _one_of(FITS),
+        one_of(FITS),
         "int",
         "FIT_LSQ, least squares over a segment, a line unless a quadratic is significant; or FIT_INTERP, the quadratic"
         " through end points and midpoint. With FIT_INTERP cuts stay as they fall.",
@@ -265,7 +216,7 @@ class ScanLineParams(Options):
     )
     measure: int = option(
         MEASURE_MIDPOINT,
-        _one_of(MEASURES),
+        one_of(MEASURES),
         "int",
         "MEASURE_MIDPOINT, strengths where the edge is; or MEASURE_ENDPOINT, extrapolated from either end point.",
         group="scan lines",
@@ -275,7 +226,7 @@ class ScanLineParams(Options):
     )
     crease: int = option(
         CREASE_NORMAL,
-        _one_of(CREASES),
+        one_of(CREASES),
         "int",
         "CREASE_NORMAL, the angle between the surface normals, which the tangents of several scan lines give; or"
         " CREASE_MAX, the largest directional angle (paper, 4.2).",
@@ -286,7 +237,7 @@ class ScanLineParams(Options):
     )
     maxShift: float = option(
         12.0,
-        _real(0),
+        real(0),
         "float",
         "How far the adapted edge position may lie from the cut (paper, 4.2, Fig. 5); 0 keeps the cut.",
         unit="pixels",
@@ -294,7 +245,7 @@ class ScanLineParams(Options):
     )
     maxGap: int = option(
         8,
-        _whole(0),
+        whole(0),
         "int",
         "Widest gap of invalid pixels on a scan line whose two sides are compared: occlusion shadows.",
         unit="pixels",
@@ -302,7 +253,7 @@ class ScanLineParams(Options):
     )
     maxSmear: int = option(
         5,
-        _whole(0),
+        whole(0),
         "int",
         "Most pixels of a scan line over which a step may be smeared, as interpolation and the footprint of a pixel do,"
         " to be one jump between the surfaces on either side. They are a surface of their own unless that is steep, or"
@@ -323,7 +274,7 @@ class ScanLineParams(Options):
     )
     mergeSignificance: float = option(
         3.5,
-        _real(0),
+        real(0),
         "float",
         "Cuts are taken back where that raises the sum of squared residuals by less than its square, in variances of"
         " the noise; a segment across an edge, or its rounding, is given to the surfaces beside it likewise. 0 keeps"
@@ -332,7 +283,7 @@ class ScanLineParams(Options):
     )
     minSignificance: float = option(
         7.0,
-        _real(0),
+        real(0),
         "float",
         "Candidates are dropped whose significance, joined with that of their neighbours, is below this; 0 keeps all.",
         group="scan lines",
@@ -356,7 +307,7 @@ class Selection(Options):
 
     jumpThreshold: float | None = option(
         None,
-        _or_none(_check.threshold),
+        or_none(_check.threshold),
         "float or None",
         "Least depth step, in the unit of the image (that of the points; metres for integers and `depthFactor` 1000)."
         " None and 0: every step that exceeds the noise. ``numpy.inf`` switches jump edges off.",
@@ -372,21 +323,21 @@ class Selection(Options):
     )
     hysteresis: float = option(
         1.0,
-        _real(0, 1, above=True),
+        real(0, 1, above=True),
         "float",
         "Low thresholds as a fraction of the high ones, in (0, 1]; 1 is no hysteresis. Pixels that reach them count"
         " where they are connected to one that reaches the high ones.",
     )
     minLength: int = option(
         5,
-        _whole(1),
+        whole(1),
         "int",
         "Least length of a connected line, >= 1: the longer side of its bounding box.",
         unit="pixels",
     )
     lineSignificance: float | None = option(
         None,
-        _or_none(_real(0)),
+        or_none(real(0)),
         "float or None",
         "Least significance of a line, >= 0: the root mean square of its pixels' significance, times the root of its"
         " length in units of 10 pixels. It may have gaps of two pixels. 0 keeps all lines. None: 20, or 0 where every"
@@ -411,154 +362,12 @@ class Selection(Options):
         flagged="every border with pixels without data is an edge; see also --shadow-edges",
     )
 
-    def of(self, params: ScanLineParams) -> Selection:
-        """The same for strengths that were measured with these parameters."""
+    def of(self, params: ScanLineParams | None = None) -> Selection:
+        """The same with a number for `lineSignificance`, for strengths measured with these parameters, if known."""
         if self.lineSignificance is not None:
             return self
-        return replace(self, lineSignificance=LINE_SIGNIFICANCE if params.minSignificance > 0 else 0.0)
-
-
-@declared
-@dataclass(frozen=True, eq=False, repr=False)
-class Seeding(Options):
-    """How seeds are found."""
-
-    minDistance: float = option(
-        3.0,
-        _real(0, above=True),
-        "float",
-        "Least distance of a seed's peak from an edge, > 0.",
-        unit="pixels",
-        group="seeds",
-    )
-    separation: float = option(
-        0.65,
-        _below_one,
-        "float",
-        "Share of the lower of two peaks to which the way between them must drop for both to count, in (0, 1).",
-        group="seeds",
-    )
-
-
-@declared
-@dataclass(frozen=True, eq=False, repr=False)
-class Growing(Seeding):
-    """How seeds are found and regions grow from them."""
-
-    tolerance: float = option(
-        3.0,
-        _real(0, above=True),
-        "float",
-        "How far a pixel may lie off its surface, > 0.",
-        unit="standard deviations",
-        group="regions",
-    )
-    smoothAngle: float = option(
-        8.0,
-        _real(0, 30),
-        "float",
-        "Angle below which surfaces that meet without an edge go on into each other, from 0 to 30.",
-        unit="degrees",
-        group="regions",
-    )
-    minArea: int = option(
-        100,
-        _whole(1),
-        "int",
-        "Least area of a region.",
-        unit="pixels",
-        group="regions",
-    )
-
-
-@declared
-@dataclass(frozen=True, eq=False, repr=False)
-class Closing(Options):
-    """How far gaps between edges are closed."""
-
-    tolerance: float = option(
-        3.0,
-        _real(0, above=True),
-        "float",
-        "How far a pixel may lie off its surface.",
-        unit="standard deviations",
-    )
-    share: float = option(
-        0.5,
-        _real(0, 1, above=True),
-        "float",
-        "Share of the pixels of a surface that must lie within `tolerance`, in (0, 1].",
-    )
-    maxGap: int = option(
-        120,
-        _whole(0),
-        "int",
-        "Longest gap to close.",
-        unit="pixels",
-    )
-    minArea: int = option(
-        50,
-        _whole(1),
-        "int",
-        "Parts of fewer pixels are no surfaces; no edge is drawn around them.",
-        unit="pixels",
-    )
-
-
-@declared
-@dataclass(frozen=True, eq=False, repr=False)
-class Cleaning(Options):
-    """What is done to depths."""
-
-    maxHole: int = option(
-        24,
-        _whole(0),
-        "int",
-        "Widest hole to fill: where a disc of this diameter without data fits in, the hole stays; 0 fills none.",
-        unit="pixels",
-        group="cleaning",
-    )
-    radius: float = option(
-        6.0,
-        _real(0, 100),
-        "float",
-        "Standard deviation of the weights with which noise is averaged over a surface, from 0, which leaves it, to"
-        " 100.",
-        unit="pixels",
-        group="cleaning",
-    )
-    removeFlying: bool = option(
-        True,
-        _check.boolean,
-        "bool",
-        "Whether to remove flying pixels (`flyingPixels`), which are holes then.",
-        group="cleaning",
-        flagged="remove pixels that hang between two surfaces, which are holes then (default: yes)",
-    )
-
-
-@declared
-@dataclass(frozen=True, eq=False, repr=False)
-class Linking(Options):
-    """How edge points are joined into chains."""
-
-    bridge: float = option(
-        6.0,
-        _real(0),
-        "float",
-        "Widest gap of a line that is bridged where kind and direction agree on its two sides: a hole, or a junction"
-        " through which an edge runs on; 0 bridges none.",
-        unit="pixels",
-        group="chains",
-    )
-    cornerAngle: float = option(
-        8.0,
-        _real(0, 180, above=True),
-        "float",
-        "A chain ends at a corner, where it turns abruptly by more; 180 follows outlines around corners.",
-        unit="degrees",
-        group="chains",
-    )
+        significant = params is None or params.minSignificance > 0
+        return replace(self, lineSignificance=_LINE_SIGNIFICANCE if significant else 0.0)
 
 
 def _of(kind: type[Options], *groups: str) -> dict[str, Option]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from . import _core
 from ._check import error
-from .options import ScanLineParams
+from .options import ScanLineParams, Selection
 
 if TYPE_CHECKING:
     from .frame import Frame
@@ -176,8 +176,10 @@ def warn_of_dropped(given: int, kept: int) -> None:
         warn("more than a tenth of the points lie behind the viewpoint and are left out; say where it is by origin")
 
 
-def warn_of_angle(creaseThreshold: float) -> None:
-    """Warn of an angle that no crease has."""
+def warn_of_selection(frame: Frame, selection: Selection) -> None:
+    """Warn of thresholds that nothing can reach."""
+    warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
+    creaseThreshold = selection.creaseThreshold
     if _HALF_TURN < creaseThreshold <= 2 * _HALF_TURN:
         warn(f"creaseThreshold={creaseThreshold:g} switches creases off: no angle exceeds 180 degrees")
 

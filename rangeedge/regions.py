@@ -10,7 +10,7 @@ import numpy as np
 from . import _core
 from ._check import boolean, image8, labels32s
 from ._option import parsed, takes
-from .detector import run_detector
+from .detection import run_detector
 from .distance import distanceTransform
 from .frame import Frame
 from .noise import measured_frame

@@ -24,6 +24,7 @@ SEGMENT = np.dtype(
         ("rms", "f8"),
         ("endDeviation", "f8"),
         ("directionDeviation", "f8"),
+        ("lengthDeviation", "f8"),
         ("count", "i4"),
         ("chain", "i4"),
         ("vertices", "2i4"),
@@ -86,7 +87,9 @@ def fitSegments(
         degrees between two faces that meet, through the solid: below 180 of a convex, above of a concave edge, NaN of a
         jump; rms, of the distances of points from the line before they were averaged; endDeviation, the standard
         deviation of an end across the line, and directionDeviation, that of the direction in degrees, both of the
-        averaged line; count of its points; chain, its number; vertices, the numbers of those at its ends, -1 for none.
+        averaged line; lengthDeviation, that of the length between two vertices, NaN where an end is none, as where the
+        edge ends is not measured then; count of its points; chain, its number; vertices, the numbers of those at its
+        ends, -1 for none.
     vertices : structured ndarray
         point (3), x and y in pixels, rms of the distances of the lines from it, and their count, at least 2.
 
@@ -194,6 +197,7 @@ def _segment(chain: EdgeChain, points: np.ndarray, number: int) -> tuple:
         rms,
         float(np.hypot(2 * centre_deviation, common)),  # at an end, the deviations of centre and slope together
         float(np.degrees(slope_deviation)),
+        np.nan,
         len(points),
         number,
         (-1, -1),
@@ -245,11 +249,14 @@ def scatter(across: np.ndarray) -> tuple[float, float]:
 def _meet(segments: np.ndarray, reach: float) -> np.ndarray:
     """The vertices; the segments get them as their ends."""
     vertices = []
+    variances = np.full((len(segments), 2), np.nan)  # of the ends, along the segments
     for group in _groups(segments, reach):
         found = _vertex(segments, group, reach)
         if found is None:
             continue
         vertex, group = found
+        for segment, side in group:
+            variances[segment, side] = _variance_along(segments, segment, [other for other, _ in group])
         for segment, side in group:
             segments["vertices"][segment, side] = len(vertices)
             segments["ends"][segment, side] = _foot(segments[segment], vertex[0])
@@ -257,7 +264,16 @@ def _meet(segments: np.ndarray, reach: float) -> np.ndarray:
         vertices.append(vertex)
     ends = segments["ends"]
     segments["length"] = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    segments["lengthDeviation"] = np.sqrt(variances.sum(axis=1))
     return np.array(vertices, VERTEX)
+
+
+def _variance_along(segments: np.ndarray, segment: int, group: list[int]) -> float:
+    """Variance of the vertex of a group of lines along one of them, on which the others tell where it is."""
+    direction = segments["direction"][segment]
+    lines = segments[[other for other in group if other != segment]]
+    sines = 1 - (lines["direction"] @ direction) ** 2
+    return float(1 / (sines / lines["endDeviation"] ** 2).sum())
 
 
 def _groups(segments: np.ndarray, reach: float) -> list[list[tuple[int, int]]]:

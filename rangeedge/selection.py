@@ -15,7 +15,7 @@ from .constants import EDGE_BOUNDARY
 from .dynamic import outstanding
 from .edges import EdgeStrength
 from .frame import threads_worth
-from .options import LINE_SIGNIFICANCE, SELECTION, Selection
+from .options import SELECTION, Selection
 from .pixels import components, pixels_of
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def overallStrength(
     overallStrength(jump, crease, jumpCut[, creaseCut[, dst]]) -> dst
 
     dst = max(strengthImage(jump, jumpCut), strengthImage(crease, creaseCut)), so both kinds of edge share
-    one scale: what :func:`salienceDistanceTransform` takes as salience.
+    one scale: what `salienceDistanceTransform` takes as salience.
 
     Parameters
     ----------
@@ -234,6 +234,11 @@ def selectEdges(*args: Any, **options: Any) -> np.ndarray:
     True
     """
     given = args[0] if args else options.get("strength")
+    if (
+        not isinstance(given, EdgeStrength)
+        and len(args) + len({"jump", "crease", "jumpThreshold"} & options.keys()) < 3
+    ):
+        raise _check.fail("strength", "of edgeStrength, or jump, crease and jumpThreshold", _check.described(given))
     return _of_strength(*args, **options) if isinstance(given, EdgeStrength) else _of_maps(*args, **options)
 
 
@@ -309,7 +314,7 @@ def select_maps(
     _core.checkpoint()
     if hysteresis < 1:
         edges = _connected_to(edges, reaching(*low), wrap)
-    least = LINE_SIGNIFICANCE if selection.lineSignificance is None else selection.lineSignificance
+    least = selection.of().lineSignificance
     if selection.minLength > 1 or (significance is not None and least > 0):
         edges = _lines(edges, selection.minLength, significance, least, wrap)
     if selection.dynamic:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -9,13 +10,20 @@ import cv2
 import numpy as np
 
 from ._check import error
+from .resection import resect
 
 Point = tuple[float, float, float]
 
 _LINES = 16  # rows and columns, each, that are looked at
 _OFF_PLANE = 0.01  # of its length, by which a scan line may lie off its plane or cone on average
-_PREFERRED = 3.0  # times the offsets of another viewpoint that those of the given one may have
+_SHARP = 0.5  # pixels, by which a plane image may be off its points
+_EXACT = 1e-3  # pixels, below which images are the same
+_PREFERRED = 3.0  # times the offsets of another viewpoint that those of (0, 0, 0) may have
 _LEAST_IMAGE = 8  # rows and columns that tell more than where rays are planes
+_GRID = 32  # rows and columns of points that tell whether rays cross each other
+_UNFOLDED = 0.98  # least share of its cells that lie the same way round
+_LEAST_FIELD = 0.05  # of view, of a scanner that turns: from far away any line lies on a cone
+_NARROWED, _HEIGHTS = 4, 25  # how often, and at how many heights, the apex of cones is looked for
 _FIXED = 1e-6  # least share of the largest eigenvalue, that planes fix a viewpoint
 _STEPS = 20  # of Newton's method, until undistorted rays meet their pixels
 
@@ -32,41 +40,56 @@ class View(NamedTuple):
     ranges: bool = False
 
 
+@np.errstate(all="ignore")  # lengths that cannot be squared
 def view_of(points: np.ndarray, origin: Point | None) -> View:
     """How points (H, W, 3) were seen, NaN where there are none.
 
     The rows and columns of a plane image lie in planes through the viewpoint, or along z where rays are parallel; those
     of a scanner that turns lie on cones around it.
     """
-    rows, columns = _lines_of(points)
-    if origin is not None:
-        place = np.asarray(origin)
-        rows, columns = [line - place for line in rows], [line - place for line in columns]
-    if not rows and not columns:
+    lines = _Lines.of(points)
+    if not lines.rows and not lines.columns:
         return _plane_view(points, origin)
-    flat = _off(_off_planes, rows, columns)
-    parallel = _off(_off_parallel, rows, columns) if origin is None else np.inf
-    if min(flat, parallel) <= _OFF_PLANE or (origin is None and min(points.shape[:2]) < _LEAST_IMAGE):
-        if _median(_off_parallel, rows + columns) < _median(_off_planes, rows + columns) and origin is None:
-            return View(False)
-        return _plane_view(points, origin)
-    turning = _off(_off_cones, rows, columns)
     if origin is not None:
-        if turning > _OFF_PLANE:
-            raise error("`origin` must be where the rays of the points meet: their rows and columns do not meet there")
-        return _turning_view(points, origin)
-    found = _common_point(rows + columns)
-    moved = np.inf
-    if found is not None:
-        moved = _off(_off_planes, [line - found for line in rows], [line - found for line in columns])
-    if turning <= _OFF_PLANE and turning <= _PREFERRED * moved:
+        return _view_from(points, origin, lines.seen_from(origin))
+    if min(points.shape[:2]) >= _LEAST_IMAGE and (view := _plane_image(points)):
+        return view
+    flat, parallel = lines.off_planes(), lines.off_parallel()
+    if min(flat, parallel) <= _OFF_PLANE or min(points.shape[:2]) < _LEAST_IMAGE:
+        return View(False) if parallel < flat else _plane_view(points, None)
+    moved, moved_off = _best(lines, _Lines.off_planes, [_common_point(lines.rows + lines.columns)])
+    turned, turned_off = _best(lines, _Lines.off_cones, _apexes(lines))
+    turning = lines.off_cones()
+    if turning <= _OFF_PLANE and turning <= _PREFERRED * min(moved_off, turned_off):
         return _turning_view(points, None)
-    if moved > _OFF_PLANE:
-        raise error(
-            "`src` must hold points whose rays meet in one point: their rows and columns neither meet in (0, 0, 0) nor"
-            " tell another viewpoint; transform them into the frame of the sensor, or say where that is by origin"
-        )
-    return _plane_view(points, tuple(found.tolist()))
+    if moved_off <= min(_OFF_PLANE, turned_off):
+        return _plane_view(points, moved)
+    if turned_off <= _OFF_PLANE:
+        return _turning_view(points, turned)
+    raise error(
+        "`src` must hold points whose rays meet in one point: their rows and columns neither meet in (0, 0, 0) nor"
+        " tell another viewpoint; transform them into the frame of the sensor, or say where that is by origin"
+    )
+
+
+def _plane_image(points: np.ndarray) -> View | None:
+    """The view of points that are the plane image of a regular grid of pixels; None where they are none."""
+    fits = resect(points)
+    best = min(fits.here, fits.parallel, fits.moved)
+    if best > _SHARP:
+        return None
+    if min(fits.here, fits.parallel) <= max(_PREFERRED * best, _EXACT):
+        return View(False) if fits.parallel < fits.here else _plane_view(points, None)
+    return _plane_view(points, tuple(fits.place.tolist()))
+
+
+def _view_from(points: np.ndarray, origin: Point, lines: _Lines) -> View:
+    """The view from where the caller says."""
+    if lines.off_planes() <= _OFF_PLANE:
+        return _plane_view(points, origin)
+    if lines.off_cones() <= _OFF_PLANE:
+        return _turning_view(points, origin)
+    raise error("`origin` must be where the rays of the points meet: their rows and columns do not meet there")
 
 
 def _plane_view(points: np.ndarray, origin: Point | None) -> View:
@@ -97,24 +120,59 @@ def unit_rays(vectors: np.ndarray) -> np.ndarray:
     return vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
 
 
-def _lines_of(points: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Points of some rows and columns, of those with three or more."""
-    height, width = points.shape[:2]
-    rows = [points[v] for v in np.unique(np.linspace(0, height - 1, _LINES).astype(int))]
-    columns = [points[:, u] for u in np.unique(np.linspace(0, width - 1, _LINES).astype(int))]
-    return tuple(
-        [line for line in (line[np.isfinite(line[:, 0])].astype(np.float64) for line in lines) if len(line) > 2]
-        for lines in (rows, columns)
-    )
+class _Lines(NamedTuple):
+    """Points of some rows and columns, of those with three or more, and of a coarse grid of both."""
+
+    rows: list[np.ndarray]
+    columns: list[np.ndarray]
+    grid: np.ndarray  # (h, w, 3)
+
+    @classmethod
+    def of(cls, points: np.ndarray) -> _Lines:
+        height, width = points.shape[:2]
+        rows = [points[v] for v in np.unique(np.linspace(0, height - 1, _LINES).astype(int))]
+        columns = [points[:, u] for u in np.unique(np.linspace(0, width - 1, _LINES).astype(int))]
+        grid = points[:: max(height // _GRID, 1), :: max(width // _GRID, 1)]
+        return cls(_finite(rows), _finite(columns), grid.astype(np.float64))
+
+    def seen_from(self, place: np.ndarray | Point) -> _Lines:
+        return _Lines([r - place for r in self.rows], [c - place for c in self.columns], self.grid - place)
+
+    def off_planes(self) -> float:
+        """How far lines lie off planes through the viewpoint; infinite where the rays cross each other."""
+        return np.inf if _folds(unit_rays(self.grid)) else self._off(_off_planes)
+
+    def off_cones(self) -> float:
+        """How far lines lie off cones around the viewpoint; infinite where rays cross each other, or lie too close."""
+        rays = unit_rays(self.grid)
+        seen = rays[np.isfinite(rays).all(axis=-1)]
+        narrow = len(seen) > 0 and np.ptp(seen, axis=0).max() < _LEAST_FIELD
+        return np.inf if narrow or _folds(rays) else self._off(_off_cones)
+
+    def off_parallel(self) -> float:
+        """How far lines lie off planes along z; infinite where they cross each other."""
+        return np.inf if _folds(self.grid[..., :2]) else self._off(_off_parallel)
+
+    def _off(self, off: Callable[[np.ndarray], float]) -> float:
+        """Of rows or columns, whichever are farther off."""
+        return max(float(np.median([off(line) for line in lines])) for lines in (self.rows, self.columns) if lines)
 
 
-def _median(off, lines) -> float:
-    return float(np.median([off(line) for line in lines]))
+def _finite(lines: list[np.ndarray]) -> list[np.ndarray]:
+    finite = [line[np.isfinite(line[:, 0])].astype(np.float64) for line in lines]
+    return [line for line in finite if len(line) > 2]
 
 
-def _off(off, rows, columns) -> float:
-    """How far rows or columns, whichever are farther, lie off."""
-    return max(_median(off, lines) for lines in (rows, columns) if lines)
+def _folds(places: np.ndarray) -> bool:
+    """Whether a grid of places in a plane, or on the unit sphere, turns over: then the points were not seen so."""
+    along, across = places[:-1, 1:] - places[:-1, :-1], places[1:, :-1] - places[:-1, :-1]
+    if places.shape[-1] == 2:
+        turn = along[..., 0] * across[..., 1] - along[..., 1] * across[..., 0]
+    else:
+        turn = (np.cross(along, across) * places[:-1, :-1]).sum(axis=-1)
+    turn = turn[np.isfinite(turn)]
+    left = int((turn > 0).sum())
+    return max(left, len(turn) - left) < _UNFOLDED * len(turn)
 
 
 def _off_plane_of(line: np.ndarray, normal: np.ndarray) -> float:
@@ -145,8 +203,56 @@ def _off_cones(line: np.ndarray) -> float:
     return float(np.sqrt(max(values[0], 0.0) / values[2])) if values[2] > 0 else 0.0
 
 
+def _best(lines: _Lines, off: Callable[[_Lines], float], places: list[np.ndarray | None]) -> tuple[Point | None, float]:
+    """The place that lines fit best, and how far they are off it."""
+    known = [place for place in places if place is not None and np.isfinite(place).all()]
+    tried = [(off(lines.seen_from(place)), tuple(place.tolist())) for place in known]
+    return min(tried)[::-1] if tried else (None, np.inf)
+
+
 def _common_point(lines: list[np.ndarray]) -> np.ndarray | None:
     """The point nearest to the planes of lines, by least squares; None where they do not fix one."""
+    moments, sums = _planes_of(lines)
+    values = np.linalg.eigvalsh(moments)
+    return np.linalg.solve(moments, sums) if values[0] > _FIXED * values[2] else None
+
+
+def _apexes(lines: _Lines) -> list[np.ndarray]:
+    """Where cones of a scanner that turns may begin: on the axis in which the planes of its columns, or rows, meet."""
+    return [
+        apex
+        for straight, round_ in ((lines.columns, lines.rows), (lines.rows, lines.columns))
+        if len(straight) > 2 and round_
+        for apex in [_apex_on(*_axis_of(straight), round_)]
+    ]
+
+
+def _axis_of(lines: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """A point of the line in which planes meet, the nearest to the lines' middle, and its direction."""
+    middle = np.concatenate(lines).mean(axis=0)
+    moments, sums = _planes_of([line - middle for line in lines])
+    values, vectors = np.linalg.eigh(moments)
+    across = vectors[:, 1:]
+    return middle + across @ ((across.T @ sums) / np.maximum(values[1:], np.finfo(float).tiny)), vectors[:, 0]
+
+
+def _apex_on(place: np.ndarray, axis: np.ndarray, lines: list[np.ndarray]) -> np.ndarray:
+    """The point of an axis around which lines lie on cones best."""
+
+    def off(height: float) -> float:
+        return float(np.mean([_off_cones(line - place - height * axis) for line in lines]))
+
+    heights = np.concatenate([(line - place) @ axis for line in lines])
+    low, high = heights.min(), heights.max()
+    for _ in range(_NARROWED):
+        tried = np.linspace(low, high, _HEIGHTS)
+        best = tried[np.argmin([off(height) for height in tried])]
+        low, high = best - (tried[1] - tried[0]), best + (tried[1] - tried[0])
+    return place + best * axis
+
+
+def _planes_of(lines: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """The weighted sums of the planes of lines, N' W N and N' W d of N x = d."""
     normals, offsets, weights = [], [], []
     for line in lines:
         middle = line.mean(axis=0)
@@ -160,14 +266,9 @@ def _common_point(lines: list[np.ndarray]) -> np.ndarray | None:
         offsets.append(vectors[:, 0] @ middle)
         # A straight line lies in many planes.
         weights.append(values[1] / (max(values[0], 0.0) + 1e-9 * values[2]))
-    n, d, w = np.array(normals), np.array(offsets), np.array(weights)
-    if len(n) < 3:
-        return None
-    w = np.minimum(w, 100 * np.median(w))
-    spread = np.linalg.eigvalsh((n * w[:, None]).T @ n)
-    if spread[0] <= _FIXED * spread[2]:
-        return None
-    return np.linalg.solve((n * w[:, None]).T @ n, (n * w[:, None]).T @ d)
+    n, d, w = np.array(normals).reshape(-1, 3), np.array(offsets), np.array(weights)
+    w = np.minimum(w, 100 * np.median(w)) if len(w) else w
+    return (n * w[:, None]).T @ n, (n * w[:, None]).T @ d
 
 
 def distorted_rays(K: np.ndarray, distCoeffs: np.ndarray, shape: tuple[int, int]) -> np.ndarray:

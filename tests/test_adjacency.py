@@ -6,6 +6,7 @@ import pytest
 
 import rangeedge
 from rangeedge import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, regionAdjacency, regionCorners
+from rangeedge.contacts import Borders
 from rangeedge.synthetic import box, cylinder, gaussianNoise, pinholeCamera, plane, renderScene, roof
 
 K = np.array([[300.0, 0, 159.5], [0, 300, 119.5], [0, 0, 1]])
@@ -163,3 +164,41 @@ def test_edges_rounded_off_by_the_sensor_keep_their_angle(convex):
     labels[:110] = labels[130:] = 0
     (pair,) = regionAdjacency(depth, labels, K=K, noise=0.0005)
     assert pair["dihedral"] == pytest.approx(90 if convex else 270, abs=3)
+
+
+@pytest.mark.parametrize("curved", [False, True])
+def test_pairs_and_corners_do_not_depend_on_other_regions(curved):
+    rng = np.random.default_rng(4)
+    v, u = np.indices((60, 80)).astype(float)
+    if curved:
+        relief, labels = 0.02 * (u % 20 - 10) ** 2, v // 20 * 8 + u // 10
+    else:
+        planes = np.stack([a * (u - 40) + b * (v - 30) - 12 * (a * a + b * b) for a, b in rng.uniform(-1, 1, (12, 2))])
+        relief, labels = planes.max(axis=0), planes.argmax(axis=0)
+    src = relief + np.where((u > 40) & (v > 30), 6, 0) + rng.normal(0, 0.01, u.shape)
+    labels = labels.astype(np.int32) + 1
+    pairs, corners = (function(src, labels, 0, 2, noise=0.01) for function in (regionAdjacency, regionCorners))
+    assert set(pairs["kind"].tolist()) == (
+        {EDGE_JUMP, EDGE_CONVEX, EDGE_CONCAVE} if curved else {EDGE_JUMP, EDGE_CONVEX}
+    )
+    assert len(corners) > 2 or curved
+
+    def is_alone(found, function, names):
+        own = function(src, np.where(np.isin(labels, names), labels, 0), 0, 2, noise=0.01)
+        return len(own) == len(found) and all(
+            np.allclose(own[name], found[name], rtol=1e-9, atol=1e-9, equal_nan=True) for name in own.dtype.names
+        )
+
+    for first, second in {(pair["first"], pair["second"]) for pair in pairs}:
+        own = pairs[(pairs["first"] == first) & (pairs["second"] == second)]
+        assert is_alone(own, regionAdjacency, [first, second])
+    for corner in corners:
+        assert is_alone(corner[None], regionCorners, corner["labels"])
+
+
+def test_means_and_medians_of_borders():
+    border = np.array([0, 0, 0, 1, 1, 1, 1, 2])
+    borders = Borders(*[np.arange(3)] * 3, np.array([0, 3, 7, 8]), border, *[np.zeros(0)] * 5)
+    values = np.array([5.0, 1, 3, 8, 2, 4, 1, np.nan])
+    assert np.array_equal(borders.medians(values), [3, 3, np.nan], equal_nan=True)
+    assert borders.means(np.stack([values, -values], axis=1))[:2].tolist() == [[3, -3], [3.75, -3.75]]

@@ -2,6 +2,7 @@
 
 import json
 import os
+import subprocess
 import sys
 import warnings
 from pathlib import Path
@@ -287,6 +288,16 @@ class TestForms:
         assert (last["state"], last["outputs"]) == ("failed", {})
         assert "missing.png" in last["error"]
 
+    @pytest.mark.parametrize("change", [lambda data: data[:-1], lambda data: data + b"0"], ids=["shorter", "longer"])
+    def test_results_of_another_length_are_made_anew(self, stack, tmp_path, change):
+        path, out = stack[0], tmp_path / "out"
+        assert states(runBatch(path, out, form="png")) == ["written"] * 3
+        result = out / "walk" / "0001.png"
+        whole = result.read_bytes()
+        result.write_bytes(change(whole))
+        assert states(runBatch(path, out, form="png")) == ["skipped", "written", "skipped"]
+        assert result.read_bytes() == whole
+
     def test_chunks_of_a_store(self, stack, tmp_path):
         zarr = pytest.importorskip("zarr")
         path, depth = stack
@@ -403,3 +414,20 @@ class TestCommand:
         assert main(self.argv(stack[0], tmp_path, *more)) == 2
         assert message in capsys.readouterr().err
         assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        "list(runBatch('stack.npy', 'out', form='png', jobs=2, noise=0.001, pixelSize=0.01))",
+        "list(rangeedge.mapFrames(np.load('stack.npy'), rangeedge.detectEdges, jobs=2))",
+    ],
+)
+def test_program_that_begins_itself_again_is_told_so_once(call, tmp_path):
+    np.save(tmp_path / "stack.npy", np.full((4, 48, 64), 2.0))
+    head = "import numpy as np\nimport rangeedge\nfrom rangeedge.batch import runBatch\n"
+    (tmp_path / "script.py").write_text(head + call)
+    done = subprocess.run([sys.executable, "script.py"], cwd=tmp_path, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1
+    assert done.stderr.count("Traceback") == 1
+    assert done.stderr.splitlines()[-1].endswith("put what it does under if __name__ == '__main__':")

@@ -42,10 +42,35 @@ def test_frames_that_are_not_there_are_named(perf, capsys, monkeypatch, tmp_path
 @pytest.mark.skipif(sys.platform != "linux", reason="memory is read from Linux")
 def test_worst_images_are_compared_with_a_typical_one(perf, capsys):
     _, _, worst = perf
-    worst.worst(64, 48, ["distanceTransform", "extractSeeds"])
+    worst.worst([(64, 48), (96, 64)], ["barrier"])
     text = capsys.readouterr().out
-    rows = re.findall(r"^(\w+): (.*?)  +([\d.]+) +([\d.]+)\*? +([\d.]+) +([\d.]+)\*? *$", text, re.MULTILINE)
-    assert {stage for stage, *_ in rows} == {"distanceTransform", "distanceTransformWithLabels", "extractSeeds"}
-    for _, name, nanoseconds, ratio, *_ in rows:
-        assert float(nanoseconds) > 0
-        assert name != "typical" or float(ratio) == 1
+    cost = r" +([\d.]+)[* ] +([\d.]+)[* ]"
+    rows = re.findall(r"^(\w+(?:, \w+)?): (.*?) " + 4 * cost + "$", text, re.MULTILINE)
+    assert {function for function, *_ in rows} == {"distanceTransform, barrier"}
+    assert len(rows) > 4
+    for _, name, *costs in rows:
+        assert all(float(cost) > 0 for cost in costs[::2])
+        assert name != "typical" or costs[1::2] == 4 * ["1.0"]
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_every_function_has_images_that_are_worse(perf):
+    _, _, worst = perf
+    images = worst.Images(32, 24)
+    for function, cases in worst.functions().items():
+        names = []
+        for name, make in cases(images):
+            make()()
+            names.append(name)
+        assert names[0] == "typical"
+        assert len(names) == len(set(names)) > 2, function
+
+
+@pytest.mark.parametrize(
+    ("costs", "marks"), [((10.0, 30.0), ""), ((30.0, 10.0), "*"), ((101.0, 101.0), "*"), ((100.0, 100.0), "")]
+)
+def test_what_takes_too_much_is_marked(perf, costs, marks):
+    _, _, worst = perf
+    cost, smallest = costs
+    cells = worst._cells((cost, 1.0), (10.0, 1.0), (smallest, 1.0))
+    assert cells.replace(" ", "").count("*") == len(marks)

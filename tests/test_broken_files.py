@@ -10,6 +10,7 @@ import time
 import zipfile
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import example, given, settings
@@ -171,6 +172,16 @@ def test_bombs_are_refused(tmp_path, make, what):
     with pytest.raises(rangeedge.error, match=what):
         imreadRange(path)
     assert time.perf_counter() - start < SLOW
+
+
+def test_what_packs_well_is_no_bomb(tmp_path):
+    """A wall that fills the image, of a size that any computer has memory for."""
+    wall = np.full((3000, 3000), 1500, np.uint16)
+    for form, contents in (("PNG", cv2.imencode(".png", wall)[1].tobytes()), ("TIFF", tiff(wall, compression="zlib"))):
+        assert len(contents) * source.UNPACKED_RATIO < wall.nbytes
+        path = tmp_path / form
+        path.write_bytes(contents)
+        assert_array_equal(imreadRange(path).src, wall)
 
 
 IN_LITTLE_MEMORY = """

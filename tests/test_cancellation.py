@@ -197,6 +197,18 @@ def test_blocks_may_be_nested():
     rangeedge.detectEdges(z)
 
 
+def test_a_block_that_is_left_leaves_the_one_around_it():
+    z, outer, inner = noise(300), rangeedge.Cancellation(), rangeedge.Cancellation()
+    with outer:
+        with inner:
+            rangeedge.detectEdges(z)
+        inner.cancel()
+        rangeedge.detectEdges(z)
+        outer.cancel()
+        with pytest.raises(CancelledError):
+            rangeedge.detectEdges(z)
+
+
 def test_what_was_given_up_leaves_dst_alone_and_the_next_call_right():
     z = noise(400)
     expected, dst = rangeedge.distanceTransform(z > 1.2), np.full(z.shape, -1, np.float32)

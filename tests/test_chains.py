@@ -178,12 +178,29 @@ def test_gaps_are_bridged_up_to_a_width():
     assert len(linkEdges(depth, pixelSize=1, noise=0.001, bridge=0)) == 2
 
 
+@pytest.mark.parametrize("bridge", [3, 6, 10])
+def test_an_edge_goes_on_behind_what_is_narrower_than_the_bridge(bridge):
+    for height in (bridge // 2, bridge, bridge + 3):
+        depth = two_steps()
+        depth[28 : 28 + height] = 2.0
+        chains = linkEdges(depth, pixelSize=1, noise=0.001, bridge=bridge)
+        assert sum(np.ptp(chain.points["y"]) > 30 for chain in chains) == (height < bridge)
+
+
 def test_gaps_are_not_bridged_between_edges_that_do_not_continue_each_other():
     depth = two_steps()
     depth[30:] = np.where(np.arange(80) + 0.2 * np.arange(30, 60)[:, None] < 38.3, 3.0, 4.0)
     chains = linkEdges(depth, pixelSize=1, noise=0.001)
     tall = [chain for chain in chains if np.ptp(chain.points["y"]) > 15]
     assert len(tall) == 2
+
+
+def test_a_jump_ends_where_its_nearer_side_changes():
+    y, x = np.mgrid[:60, :80]
+    depth = np.where((x < 40) == (y < 30), 3.0, 4.0)
+    chains = linkEdges(depth, pixelSize=1, noise=0.001)
+    assert len(chains) == 4
+    assert all(chain.kind == EDGE_JUMP and 20 < chain.pixels < 45 for chain in chains)
 
 
 def test_a_chain_is_of_one_kind():

@@ -1,5 +1,6 @@
 """The command line: what it writes, what it says, and how it fails."""
 
+import itertools
 import json
 import os
 import subprocess
@@ -500,7 +501,7 @@ def test_lines_writes_chains_and_segments(image, tmp_path, capsys):
     assert report["chains"] == len(chains) >= 4
     assert report["segments"] == len(fitSegments(chains).segments) == 4
     assert f"{report['chains']} chains, 4 segments" in said
-    assert report["understood"]["unit"] == "stored values / 1000"
+    assert report["understood"]["unit"] == "m (stored in mm)"
     assert report["understood"]["medianDepth"] == pytest.approx(1.5, abs=0.01)
     assert report["noise"]["a"] == pytest.approx(estimateNoise(imreadRange(image).src, K=K).a)
     assert len((out / "chains.csv").read_text().splitlines()) == 1 + len(chains.points)
@@ -573,6 +574,25 @@ def test_saved_parameters_are_those_of_the_flags(image, saved, tmp_path, capsys)
 def test_numbers_may_have_blanks_between(image, tmp_path, capsys):
     assert run(capsys, "detect", image, "-K", "100 100 39.5 29.5", "--out", tmp_path / "a")[0] == 0
     assert json.loads((tmp_path / "a/report.json").read_text())["options"]["K"][0] == [100, 0, 39.5]
+
+
+def test_parameters_saved_from_the_shell_come_back(image, tmp_path, capsys):
+    """Whatever their types: with the file alone the results are those of the flags, and it saves the same again."""
+    flags = [*CAMERA, "--crease-threshold", "20", "--jump-threshold", "inf", "--noise", "0.001,0,0.002,1.5,3"]
+    flags += ["--invalid", "0,8000:inf", "--no-shadow-edges", "--directions", "rows,cols", "--fit", "interp"]
+    saved = [tmp_path / name for name in ("a.yml", "b.xml", "c.json")]
+    assert run(capsys, "detect", image, *flags, "--save-params", saved[0], "--out", tmp_path / "a")[0] == 0
+    for old, new in itertools.pairwise([*saved, saved[0]]):
+        options = ["--params", old, "--save-params", new, "--out", tmp_path / "b"]
+        assert run(capsys, "detect", image, *options)[0] == 0
+        for name in ("thin.png", "points.csv"):
+            assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+    detector = createScanLineDetector()
+    detector.load(saved[1])
+    assert (detector.getCreaseThreshold(), detector.getJumpThreshold(), detector.getDirections()) == (20, np.inf, 3)
+    assert (detector.getInvalid(), detector.getShadowEdges()) == (((0, 0), (8000, np.inf)), False)
+    assert run(capsys, "detect", image, "--save-params", tmp_path / "a.txt", "--out", tmp_path / "c")[0] == 2
+    assert not (tmp_path / "c").exists()
 
 
 def test_flags_come_before_saved_parameters(image, saved, tmp_path, capsys):

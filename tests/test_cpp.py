@@ -1,5 +1,6 @@
-"""The C++ core on its own: installed by CMake, found by a program of another project, and run."""
+"""The C++ core: what its threads promise; installed by CMake, found by a program of another project, and run."""
 
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -30,3 +31,14 @@ def test_a_program_finds_edges_with_the_installed_core(tmp_path):
     assert words[1:] == ["pixels", "on", "edges,", "noise", words[-1]]
     assert 60 <= int(words[0]) <= 160  # the step is 60 pixels long, and has a pixel on either side
     assert 0.008 < float(words[-1]) < 0.012
+
+
+COMPILER = shutil.which(os.environ.get("CXX", "c++"))
+
+
+@pytest.mark.skipif(not COMPILER or os.name == "nt", reason="there is no compiler that takes these options")
+def test_threads_and_watches_do_what_they_promise(tmp_path):
+    program = tmp_path / "threads"
+    source = ROOT / "tests/cpp/threads.cpp"
+    run(COMPILER, "-std=c++17", "-O0", "-pthread", "-I", ROOT / "rangeedge/core", source, "-o", program)
+    assert run(program) == ""

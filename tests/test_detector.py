@@ -136,8 +136,8 @@ def test_one_way_from_strengths_to_edges(scene, options):
 
 def test_edges_with_strength_run_the_scan_lines_once(scene, monkeypatch):
     calls = []
-    kernel = rangeedge.detector.measure_strength
-    monkeypatch.setattr("rangeedge.detector.measure_strength", lambda *args: calls.append(args) or kernel(*args))
+    kernel = rangeedge.detection.measure_strength
+    monkeypatch.setattr("rangeedge.detection.measure_strength", lambda *args: calls.append(args) or kernel(*args))
     detectEdgesWithStrength(scene, K=K)
     assert len(calls) == 1
 

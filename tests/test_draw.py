@@ -14,6 +14,11 @@ from rangeedge.constants import (
     EDGE_OCCLUDING,
 )
 from rangeedge.draw import colorizeDistance, drawEdges, drawOverview, drawRegions
+from rangeedge.draw.lines import write_lengths
+from rangeedge.draw.overview import _beside_small_holes
+from rangeedge.draw.regions import _middles, write_numbers
+from rangeedge.draw.sheet import _step, with_axes
+from rangeedge.segments import SEGMENT, VERTEX
 
 VERMILION, PURPLE, YELLOW, BLUE, GREY, WHITE = (
     (0, 94, 213),
@@ -363,3 +368,52 @@ class TestDrawOverview:
         } | change
         with pytest.raises(rangeedge.error, match=f"drawOverview.*`{name}`"):
             drawOverview(**arguments)
+
+
+class TestNumbers:
+    def test_regions_have_their_labels_where_there_is_room(self):
+        labels = np.zeros((80, 120), np.int32)
+        labels[5:60, 5:60], labels[10:50, 70:110], labels[70:73, 70:73] = 7, 12, 3
+        picture = np.zeros((160, 240, 3), np.uint8)
+        assert write_numbers(picture, labels) == 2
+        rows, cols = np.nonzero(picture.any(axis=2))
+        assert labels[rows // 2, cols // 2].min() > 0  # inside of their regions
+        left = picture[:, :130].any(axis=2)
+        assert abs(np.nonzero(left)[1].mean() - 2 * 32) < 6
+        assert abs(np.nonzero(left)[0].mean() - 2 * 32) < 6
+        assert not picture[136:].any()
+
+    def test_middles_are_farthest_from_the_border(self):
+        labels = np.int32([[1, 1, 1, 1, 1, 2, 2, 2]] * 5)
+        found = {label: (place, room) for label, place, room in _middles(labels)}
+        assert found[1] == ((2, 2), pytest.approx(3, abs=0.1))
+        assert found[2][0][1] == 6
+
+    @pytest.mark.parametrize(("count", "step"), [(5, 1), (6, 1), (7, 2), (12, 2), (480, 100), (640, 200), (4000, 1000)])
+    def test_axes_have_round_steps(self, count, step):
+        assert _step(count) == step
+
+    def test_axes_lie_outside_of_the_picture(self):
+        picture = np.full((100, 200, 3), 77, np.uint8)
+        framed = with_axes(picture, (50, 100))
+        assert (framed[:100, -200:] == 77).all()
+        assert framed[100:].any()
+
+    def test_lengths_stay_clear_of_each_other_and_of_vertices(self):
+        segments = np.zeros(3, SEGMENT)
+        segments["pixels"] = [[(10, 50), (90, 50)], [(10, 52), (90, 52)], [(10, 90), (14, 90)]]
+        segments["length"] = 1, 2, 3.123
+        canvas = np.zeros((400, 400, 3), np.uint8)
+        assert write_lengths(canvas, segments[:1], np.zeros(0, VERTEX), 4) == 1
+        assert write_lengths(canvas, segments, np.zeros(0, VERTEX), 4) == 2  # the last one is shorter than its number
+        blocked = np.zeros(80, VERTEX)
+        blocked["x"], blocked["y"] = np.repeat(np.linspace(10, 90, 40), 2), np.tile([46, 50], 40)
+        assert write_lengths(canvas, segments[:1], blocked, 4) == 0
+
+
+def test_rims_of_small_holes_are_no_kinds_of_candidates():
+    valid = np.ones((30, 40), bool)
+    valid[5, 5] = valid[20:23, 20:23] = False
+    small = _beside_small_holes(valid)
+    assert small[4:7, 4:7].all()
+    assert not small[19:24, 19:24].any()

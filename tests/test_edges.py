@@ -26,8 +26,10 @@ from rangeedge import (
     FIT_LSQ,
     MEASURE_MIDPOINT,
     ScanLineParams,
+    detectEdges,
     edgePoints,
     edgeStrength,
+    explainPixel,
 )
 
 NAN = np.nan
@@ -139,6 +141,53 @@ def test_gaps_of_no_data_are_bridged_up_to_a_width(maxGap, seen):
     assert (strength.jump[:, 22] > 0).all() == seen
     if seen:
         np.testing.assert_allclose(strength.jump[:, [18, 22]], 0.25, rtol=1e-6)
+
+
+@pytest.mark.parametrize("hole", [slice(12, 13), slice(12, 14), slice(25, 27)])
+def test_surfaces_run_on_across_small_holes(hole):
+    z = np.abs(np.arange(41) - 20.25) * 0.5 * np.ones((41, 1))  # a roof
+    whole = edgePoints(z, noise=0.01, directions=DIR_ROWS)
+    z[:, hole] = NAN
+    found = edgePoints(z, noise=0.01, directions=DIR_ROWS)
+    assert len(found) == len(whole) == 41
+    for name in ("x", "y", "crease", "kind"):
+        np.testing.assert_allclose(found[name], whole[name], rtol=1e-5)
+    wider = z.copy()
+    wider[:, hole.start : hole.start + 3] = NAN
+    assert (edgePoints(wider, noise=0.01, directions=DIR_ROWS)["significance"] < found["significance"]).all()
+
+
+@pytest.mark.parametrize("hole", [19, 20, slice(19, 21)])
+def test_steps_do_not_run_on_across_small_holes(hole):
+    z = np.where(np.arange(40) < 20, 1.25, 1.0) * np.ones((30, 1))
+    z[:, hole] = NAN
+    strength = edgeStrength(z, noise=0.001, directions=DIR_ROWS)
+    beside = [18 if hole != 20 else 19, 21 if hole != 19 else 20]
+    np.testing.assert_allclose(strength.jump[:, beside], 0.25, rtol=1e-6)
+    strength.jump[:, beside] = 0
+    assert not strength.jump.any()
+
+
+def test_small_holes_everywhere_hide_no_crease():
+    rng = np.random.default_rng(5)
+    z = 3 / (1 + 0.3 * np.abs(np.arange(160) - 79.6) / 80) + 0.004 * rng.normal(size=(120, 160))
+    camera = dict(K=(160, 160, 79.5, 59.5))
+    assert (detectEdges(z, **camera) > 0).sum() == 120
+    z[rng.random(z.shape) < 0.1] = NAN
+    edges = detectEdges(z, **camera) > 0
+    assert edges[:, 77:83].any(axis=1).sum() >= 110
+    assert edges.sum() == edges[:, 77:83].sum()
+
+
+@pytest.mark.parametrize("waves", [0, 1, 4])
+@pytest.mark.parametrize("share", [0.05, 0.2, 0.4])
+def test_small_holes_make_no_edges_of_noise(waves, share):
+    rng = np.random.default_rng(6)
+    noise = rng.normal(size=(240, 320))
+    noise = cv2.GaussianBlur(noise, (0, 0), waves) if waves else noise
+    z = 1.5 / (1 - 0.4 * (np.arange(320) - 160) / 300) + 0.003 * noise / noise.std()
+    z[rng.random(z.shape) < share] = NAN
+    assert not detectEdges(z, K=(300, 300, 159.5, 119.5)).any()
 
 
 def test_eps_is_the_tolerance_of_splitting():
@@ -385,3 +434,16 @@ def test_of_equal_creases_the_convex_one_tells_the_type(sign):
     assert across[0].crease[20, 20] == across[1].crease[20, 20]
     both = rangeedge.edgeStrength(saddle, directions=rangeedge.DIR_ROWS | rangeedge.DIR_COLS, **options)
     assert both.kind[20, 20] == rangeedge.EDGE_CONVEX
+
+
+def test_segments_end_at_pixels_without_data():
+    rng = np.random.default_rng(0)
+    x = np.arange(60)
+    z = 5 + 0.01 * x + np.where(x > 30, 0.05 * (x - 30), 0) + rng.normal(0, 0.01, (40, 60))
+    z[rng.random(z.shape) < 0.06] = np.nan
+    z[20, 30] = 6
+    for line in explainPixel(z, 30, 20, noise=0.01, pixelSize=1, reach=60).lines:
+        seen = np.isfinite(line.samples["depth"])
+        assert len(line.segments) > 1
+        for segment in line.segments:
+            assert seen[int(segment["first"]) : int(segment["last"]) + 1].all()

@@ -11,6 +11,7 @@ import rangeedge
 from rangeedge import NoiseModel, detectEdges, drawExplanation, explainPixel
 from rangeedge.app.cli import main
 from rangeedge.draw.explanation import _ticks
+from rangeedge.options import DETECTION
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
 
 CAMERA = pinholeCamera(np.array([[80.0, 0, 39.5], [0, 80.0, 29.5], [0, 0, 1]]), (80, 60))
@@ -48,22 +49,45 @@ def near_edges(edges, every):
     return list(zip(*np.nonzero(near.T), strict=True))[::every]
 
 
+def halved(change, options):
+    """Half of a change of these options: of a number half the way, of a switch nothing."""
+    own = {**{name: option.default for name, option in DETECTION.items()}, **options}
+    own["jumpThreshold"] = own["jumpThreshold"] or 0.0
+    if own["lineSignificance"] is None:
+        own["lineSignificance"] = 20.0 if own["minSignificance"] > 0 else 0.0
+    half = {}
+    for name, value in change.items():
+        if not isinstance(value, bool):
+            way = (value - own[name]) / 2
+            half[name] = own[name] + (int(way) if isinstance(value, int) else way)
+    return half
+
+
+def check_change(why, src, options):
+    """With the change the answer is the other one, with half of it not, and so many other pixels change as it says."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rangeedge.RangeEdgeWarning)  # of thresholds above every depth
+        before = detectEdges(src, **options)
+        turned = detectEdges(src, **{**options, **why.change})
+        half = detectEdges(src, **{**options, **halved(why.change, options)})
+    assert (turned[why.y, why.x] > 0) != why.edge, why
+    assert (half[why.y, why.x] > 0) == why.edge, why
+    assert why.others == np.count_nonzero(before != turned) - 1
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_agrees_with_the_map(name):
     src, options = CASES[name]
     edges = detectEdges(src, **options)
-    changed = {True: 0, False: 0}
-    for x, y in near_edges(edges, 4):
+    explained = changed = 0
+    for x, y in near_edges(edges, 7):
         why = explainPixel(src, int(x), int(y), **options)
         assert why.edge == (edges[y, x] > 0)
         assert why.edge == (why.stage == "edge")
         assert why.stage in STAGES
         if why.change:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", rangeedge.RangeEdgeWarning)  # of thresholds above every depth
-                turned = detectEdges(src, **{**options, **why.change})[y, x] > 0
-            assert turned != why.edge, (x, y, why.change)
-            changed[why.edge] += 1
+            check_change(why, src, options)
+        explained, changed = explained + why.edge, changed + (why.edge and bool(why.change))
         if why.edge:
             assert why.nearest == ()
         elif why.nearest and why.nearest[0].edge:
@@ -74,7 +98,65 @@ def test_agrees_with_the_map(name):
         else:
             rows, cols = np.nonzero(edges)
             assert np.hypot(rows - y, cols - x).min() > 24
-    assert changed[True] > 0.9 * np.count_nonzero(edges) / 4 * 0.8
+    assert changed >= 0.9 * explained > 5
+
+
+ROOF = 0.06 * np.abs(np.arange(80) - 40.3) * np.ones((60, 1)) + np.random.default_rng(0).normal(0, 0.02, (60, 80))
+SCENES = {
+    "box": (depths(0), {"K": K}),
+    "noisy": (depths(3, 0.008), {"K": K}),
+    "other": (depths(11, 0.004), {"K": K}),
+    "roof": (ROOF, {"noise": 0.02, "creaseThreshold": 5}),
+}
+STRICT = {
+    "creaseThreshold": {"creaseThreshold": 110},
+    "jumpThreshold": {"jumpThreshold": 0.9},
+    "lineSignificance": {"lineSignificance": 500.0},
+    "minLength": {"minLength": 200},
+    "minSignificance": {"minSignificance": 300.0},
+    "hysteresis": {"creaseThreshold": 150.0, "jumpThreshold": 3.0, "hysteresis": 0.7},
+    "several": {"lineSignificance": 500.0, "minLength": 200, "creaseThreshold": 110},
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_of_an_edge_that_an_option_suppresses_the_option_is_named(name):
+    """Together with those that the pieces of lines that are left then need; and never more of it than necessary."""
+    src, known = SCENES[name]
+    edges = detectEdges(src, **known)
+    count = {True: 0, False: 0}
+    for strict in STRICT.values():
+        options = {**known, **strict}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", rangeedge.RangeEdgeWarning)
+            gone = np.argwhere((edges > 0) & (detectEdges(src, **options) == 0))[::17]
+            found = [explainPixel(src, int(x), int(y), **options) for y, x in gone]
+        for why in found:
+            count[bool(why.change)] += 1
+            if why.change:
+                assert why.change.keys() & {*strict, "lineSignificance", "minLength"}
+                check_change(why, src, options)
+    assert count[True] > 3 * count[False]
+
+
+def test_change_is_a_round_number_that_hardly_exceeds_what_is_needed():
+    step = np.where(np.arange(40) < 20, 1.0, 1.2468) * np.ones((30, 1))
+    step[:, 35:] = 2.0
+    roof = 0.2 * np.abs(np.arange(64) - 30.3) * np.ones((48, 1))  # 22.62 degrees
+    assert explainPixel(step, 19, 15, 0.3, noise=0.001).change == {"jumpThreshold": 0.246}
+    assert explainPixel(step, 19, 15, noise=0.001).change == {"jumpThreshold": 0.25}
+    assert explainPixel(roof, 30, 20, noise=0.001).change == {"creaseThreshold": 22.0}
+    assert explainPixel(roof, 30, 20, creaseThreshold=60.0, noise=0.001).change == {"creaseThreshold": 20.0}
+
+
+def test_of_several_options_that_drop_a_line_the_one_is_named_that_changes_the_fewest_others():
+    """A short step beside long ones, larger than these, and as significant."""
+    surface = np.ones((60, 60))
+    surface[:, 30:] += 0.3
+    surface[10:22, 5:15] = 0.5
+    why = explainPixel(surface, 9, 10, noise=0.001)
+    assert (why.edge, why.change) == (True, {"lineSignificance": 230.0})
+    assert why.others == np.count_nonzero(detectEdges(surface, noise=0.001)[:, :20]) - 1
 
 
 @pytest.mark.parametrize("name", ["default", "heights", "noisy"])
@@ -128,7 +210,7 @@ def test_names_the_nearest_edge_and_a_nearer_candidate():
     assert candidate.edge is False
     assert abs(candidate.x - 39.5) <= 0.5
     assert candidate.crease == pytest.approx(np.degrees(np.arctan(0.1)), abs=0.01)
-    assert "The nearest edge is (19, 20), 16 pixels away: a jump of 0.5, jump occluding." in str(why)
+    assert "The nearest edge is (19, 20), 16 pixels away: a jump of 0.5 (jump, nearer side)." in str(why)
     assert "The nearest candidate, itself no edge, is (" in str(why)
     assert explainPixel(np.ones((40, 80)), 35, 20, noise=0.001).nearest == ()
 
@@ -146,7 +228,7 @@ def test_every_stage_by_hand():
     for (x, y), stage in explained.items():
         assert explainPixel(step, x, y, noise=0.001).stage == stage
     assert explainPixel(step, 19, 15, 0.3, noise=0.001).stage == "threshold"
-    assert explainPixel(step, 19, 15, 0.3, noise=0.001).change == {"jumpThreshold": 0.249}
+    assert explainPixel(step, 19, 15, 0.3, noise=0.001).change == {"jumpThreshold": 0.25}
     assert explainPixel(step, 19, 15, noise=0.001, minLength=31).change == {"minLength": 30}
     weak = explainPixel(step, 19, 15, noise=0.001, lineSignificance=1e6)
     assert (weak.stage, list(weak.change)) == ("line", ["lineSignificance"])
@@ -244,7 +326,9 @@ def test_command_names_options_as_it_takes_them(tmp_path, capsys):
     for options in ([], ["--line-significance", "1e6"]):
         assert main([*command, *options]) == 0
         said = capsys.readouterr().out
-        advice = re.search(r"^  With (.*) it is (none|one)\.$", said, re.MULTILINE)
+        advice = re.search(
+            r"^  With (.*) it is (none|one)\.( \d+ other edge pixels come or go with that\.)?$", said, re.MULTILINE
+        )
         assert not re.search(r"creaseThreshold|jumpThreshold|minLength|lineSignificance", said)
         assert main([*command, *options, *advice[1].split(", ")]) == 0
         assert (", no edge." in capsys.readouterr().out) == (advice[2] == "none")
@@ -254,5 +338,5 @@ def test_noise_that_is_larger_over_many_pixels_is_said_to_be():
     image, known = depths(1), {"K": K}
     waves = explainPixel(image, 10, 10, noise=NoiseModel(0.002, correlation=4.2), **known)
     assert waves.correlation == 4.2
-    assert "noise 0.002 (4.2 times that over many pixels);" in str(waves)
-    assert "noise 0.002;" in str(explainPixel(image, 10, 10, noise=0.002, **known))
+    assert "noise 0.002 m (correlated: 4.2 times that over many pixels);" in str(waves)
+    assert "noise 0.002 m;" in str(explainPixel(image, 10, 10, noise=0.002, **known))

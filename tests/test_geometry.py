@@ -150,6 +150,17 @@ def test_a_mask_is_no_data(pinhole):
             assert all(np.array_equal(a, b) for a, b in zip(expected, got, strict=True))
 
 
+def test_data_is_what_no_mask_and_no_value_takes_away(pinhole):
+    z = pinhole.depth.copy()
+    rng = np.random.default_rng(4)
+    inside, measured, known = (rng.random(z.shape) < 0.8 for _ in range(3))
+    z[~known] = 99
+    src = np.ma.masked_array(z, mask=~measured)
+    for invalid, seen in ((None, inside & measured), (99.0, inside & measured & known)):
+        frame = read_frame(src, ScanLineParams(K=K, invalid=invalid), inside)
+        assert np.array_equal(frame.valid > 0, seen)
+
+
 def test_a_skewed_camera_sees_the_same_roof():
     # The angle of a crease does not depend on the camera.
     for matrix in (K, K + np.array([[0, 25.0, 0], [0, 0, 0], [0, 0, 0]]), K + np.diag([0, 80.0, 0])):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge import _check, _core
+from rangeedge import _check, _core, optimality, synthetic
 from rangeedge.batch import detectBatch
 from rangeedge.frame import read_frame
 from rangeedge.options import ScanLineParams
@@ -52,7 +52,10 @@ def test_options_that_are_no_numbers(name, value):
         lambda: rangeedge.edgeStrength(DEPTH, origin=(HUGE, 0, 0)),
         lambda: rangeedge.strengthImage(DEPTH, HUGE),
         lambda: rangeedge.selectEdges(DEPTH, DEPTH, HUGE, 1.0),
+        lambda: rangeedge.selectEdges(None),
+        lambda: rangeedge.selectEdges(strength=DEPTH, jumpThreshold=1.0),
         lambda: rangeedge.NoiseModel(HUGE, 0, 0),
+        lambda: synthetic.orthographicCamera((1, 1), (9, 9), DEPTH),
         lambda: rangeedge.splitScanLine(DEPTH[0], 1, [[1], [2, 3]]),
         lambda: rangeedge.splitScanLine(DEPTH[0], 1, Unspeakable()),
         lambda: rangeedge.imreadRange(NoPath()),
@@ -69,6 +72,16 @@ def test_options_that_are_no_numbers(name, value):
 def test_odd_values(call):
     with pytest.raises(rangeedge.error):
         call()
+
+
+def test_errors_whose_squares_are_beyond_double_precision():
+    statistics = optimality.errorStatistics(np.full(3, 1e300))
+    assert (statistics.mean, statistics.largest, statistics.over) == (1e300, 1e300, 1.0)
+
+
+def test_planes_that_are_parallel_have_no_edge():
+    flat = np.array([[0.0, 0, 1]])
+    assert np.isnan(optimality.measureDetector(flat, flat, 90.0, size=20, seed=7)).all()
 
 
 def test_infinite_values_that_are_invalid_may_be_beyond_double_precision():

@@ -18,7 +18,7 @@ from rangeedge import (
     edgePoints,
     edgeStrength,
 )
-from rangeedge.detector import run_detector
+from rangeedge.detection import run_detector
 from rangeedge.frame import read_frame
 from rangeedge.options import Selection
 

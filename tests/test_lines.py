@@ -313,3 +313,15 @@ def test_bad_arguments_are_named(call, text):
     with pytest.raises(rangeedge.error) as problem:
         call()
     assert text in str(problem.value)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".ply", ".obj", ".geojson", ".svg"])
+@pytest.mark.parametrize("closed", [False, True])
+def test_lines_without_points_leave_the_others_alone(tmp_path, suffix, closed):
+    pixels = np.array([[0.0, 0], [1, 1], [2, 0]])
+    full = Line("convex", closed, pixels, np.column_stack([pixels, np.ones(3)]), {})
+    none = Line("concave", closed, np.zeros((0, 2)), np.zeros((0, 3)), {})
+    rangeedge.writeLines(tmp_path / f"a{suffix}", [none, full, none])
+    found = [line for line in rangeedge.readLines(tmp_path / f"a{suffix}") if len(line.pixels)]
+    assert [(line.kind, line.closed, len(line.pixels)) for line in found] == [("convex", closed, 3)]
+    assert len(rangeedge.readLines(tmp_path / f"a{suffix}")) == (1 if suffix in (".csv", ".ply") else 3)

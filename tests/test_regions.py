@@ -1,6 +1,7 @@
 """Regions: hand cases, properties, surfaces, and figures on real and rendered scenes."""
 
 import time
+from types import SimpleNamespace
 
 import cv2
 import numpy as np
@@ -13,6 +14,7 @@ from rangeedge.noise import NoiseModel
 from rangeedge.options import ScanLineParams
 from rangeedge.regions import growRegions, growRegionsWithStats, segmentRegions, segmentRegionsWithStats
 from rangeedge.seeds import find_seeds
+from rangeedge.surfaces import _curved, surfaces_of
 from rangeedge.synthetic import (
     abwCamera,
     abwNoise,
@@ -143,6 +145,55 @@ class TestGrowing:
         labels = segmentRegions(height, edges=outline, noise=SIGMA)
         along_row, along_col = labels[10 + width // 2, 30], labels[50, 69 - width // 2]
         assert len({labels[0, 0], along_row, along_col}) == regions
+
+    @pytest.mark.parametrize("tolerance", [2.0, 3.0, 4.0])
+    def test_a_small_face_that_is_hardly_raised_belongs_to_the_one_around_it(self, tolerance):
+        markers = markers_at(STEP.shape, (slice(5, 25), slice(10, 110)), (slice(42, 52), slice(52, 62)))
+        for raised, count in ((2.5, 1), (3.7, 2)):  # tolerances
+            face = np.zeros(STEP.shape)
+            face[40:54, 50:64] = raised * tolerance * SIGMA
+            assert growRegions(noisy(face), markers, heightMap=True, noise=SIGMA, tolerance=tolerance).max() == count
+
+    def test_a_strip_stays_where_edges_part_it_from_what_is_beside_it(self):
+        # Too steep to go on into the planes on either side, and all within twice the tolerance of these.
+        profile = columns(np.where(np.abs(X - 60) < 4, 0.5 * (X - 60), 0), 100)
+        src = profile + np.random.default_rng(0).normal(0, 0.33, profile.shape)
+        strip = slice(5, 95), slice(58, 63)
+        markers = markers_at(src.shape, (slice(10, 90), slice(10, 50)), (slice(10, 90), slice(70, 110)), strip)
+        for open_rows, stays in ((10, True), (26, False), (60, False)):
+            edges = np.zeros(src.shape, np.uint8)
+            edges[open_rows:, [56, 64]] = 255
+            labels = growRegions(src, markers, edges=edges, heightMap=True, noise=0.33)
+            own = np.bincount(labels[strip].ravel()).argmax()
+            assert (np.count_nonzero(labels == own) < 1000) == stays
+
+    def test_waves_of_the_noise_count_up_to_a_bound(self):
+        # Eight times what neighbours differ by: of two planes with waves, those within 36 deviations are one.
+        rng = np.random.default_rng(0)
+        waves = cv2.resize(rng.normal(0, 1, (26, 31)), (120, 100), interpolation=cv2.INTER_CUBIC)
+        src = 12 * waves / waves.std() + rng.normal(0, 1, waves.shape)
+        markers = markers_at(src.shape, (slice(5, 95), slice(5, 55)), (slice(5, 95), slice(65, 115)))
+        for step, count in ((30, 1), (45, 2)):
+            assert growRegions(src + step * (X >= 60), markers, heightMap=True, noise=1.0).max() == count
+
+    @pytest.mark.parametrize(("off", "labelled"), [(9, True), (15, False)])
+    def test_pixels_of_edges_may_lie_farther_off(self, off, labelled):
+        src = noisy(columns(0.1 * X))
+        src[20:60:4, 60] += off * SIGMA
+        edges = np.zeros(src.shape, np.uint8)
+        edges[:, 60] = 255
+        labels = growRegions(src, markers_at(src.shape, (slice(10, 70), slice(10, 110))), edges=edges, noise=SIGMA)
+        assert (labels[20:60:4, 60] > 0).all() == labelled
+
+    def test_borders_move_to_where_surfaces_meet(self):
+        # The edge is drawn beside the ridge, up to where pixels lie off the wrong plane by more than the tolerance.
+        src = columns(np.where(X > 60, 0.25 * (X - 60), 0), 100)
+        src += np.random.default_rng(0).normal(0, 0.5, src.shape)
+        markers = markers_at(src.shape, (slice(10, 90), slice(10, 50)), (slice(10, 90), slice(75, 110)))
+        edges = np.zeros(src.shape, np.uint8)
+        edges[:, 67] = 255
+        labels = growRegions(src, markers, edges=edges, heightMap=True, noise=0.5)
+        assert abs(np.mean((labels == 1).sum(axis=1)) - 60) < 3
 
     def test_edges_on_a_smooth_surface_do_not_part_it(self):
         src = noisy(columns(0.2 * X))
@@ -472,6 +523,38 @@ class TestRenderedScenes:
     def test_curved(self, camera, noise):
         s = scores(curvedScene, camera, noise, [11])
         assert s.correct >= 0.7 * s.truth
+
+
+@pytest.mark.parametrize(("side", "curved"), [(6, False), (8, True)])
+def test_few_pixels_tell_no_curvature(side, curved):
+    y, x = np.mgrid[:20, :20]
+    labels = np.zeros((20, 20), np.int32)
+    labels[5 : 5 + side, 5 : 5 + side] = 1
+    frame = read_frame(0.1 * ((x - 8.0) ** 2 + (y - 8.0) ** 2), ScanLineParams(heightMap=True))
+    assert surfaces_of(frame, labels, 2)["curved"].tolist() == [False, curved]
+
+
+@pytest.mark.parametrize("share", [0.75, 0.85])
+def test_a_surface_is_curved_if_a_fifth_less_is_left_than_by_a_plane(share):
+    y, x = np.mgrid[-10:10, -10:10] + 0.5
+    chequered, bulge = (-1.0) ** (x + y), x**2 - np.mean(x**2)
+    bulge *= np.sqrt(1 / share**2 - 1) / np.sqrt(np.mean(bulge**2))
+    labels, curved = np.ones(x.shape, np.int32), [False, share < 0.8]
+    frame = read_frame(chequered + bulge + 0.3 * x + 100, ScanLineParams(heightMap=True))
+    assert surfaces_of(frame, labels, 2)["curved"].tolist() == curved
+    # Seen from within: of inverse distances over rays.
+    rays = np.stack([x / 20, y / 20, np.ones(x.shape)], axis=-1)
+    rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+    terms = rays.reshape(-1, 3)
+    products = np.stack([terms[:, i] * terms[:, j] for i in range(3) for j in range(i, 3)], axis=1)
+    whole = np.column_stack([terms, products])
+    noise, bend = chequered.ravel(), products[:, 0]
+    noise = noise - whole @ np.linalg.lstsq(whole, noise, rcond=None)[0]
+    bend = bend - terms @ np.linalg.lstsq(terms, bend, rcond=None)[0]
+    bend *= np.sqrt(1 / share**2 - 1) * np.linalg.norm(noise) / np.linalg.norm(bend)
+    inverse = (terms @ (0.2, 0, 1) + 1e-3 * (noise + bend)).reshape(x.shape)
+    around = SimpleNamespace(samples=rays / inverse[..., None])
+    assert _curved(around, labels, 2).tolist() == curved
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # the loader leaves a file open

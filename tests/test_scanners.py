@@ -8,6 +8,7 @@ import rangeedge
 from rangeedge import detectEdges, edgePoints, edgeStrength, segmentRegions
 from rangeedge.frame import read_frame
 from rangeedge.options import ScanLineParams
+from rangeedge.viewpoint import View, distorted_rays, mean_ray, view_of
 
 WALLS = ((0, 5.0), (0, -4.0), (1, 3.5), (1, -4.5), (2, -1.2), (2, 1.8))  # axis, place
 COLUMNS = 512
@@ -175,6 +176,60 @@ def test_clouds_in_another_frame(place, given):
     assert segmentRegions(points, **options).max() == segmentRegions(z, K=K).max()
 
 
+FIELDS = [(64, 45, (180, -180)), (96, 22, (135, -135)), (100, 15, (60, -60))]
+
+
+@pytest.mark.parametrize("place", [(100, -20, 3), (1, 0, 0), (0, 0, 1), (0.3, 0.2, 0.1), (400000, 5e6, 120)])
+@pytest.mark.parametrize(("rows", "elevation", "azimuth"), FIELDS)
+def test_scans_in_another_frame(rows, elevation, azimuth, place):
+    rays, ranges, _ = sweep(rows, elevation, azimuth)
+    points = rays * (ranges + 0.005 * np.random.default_rng(1).standard_normal(ranges.shape))[..., None]
+    right = detectEdges(points) > 0
+    moved = points @ turned((20, -50, 140)).T + np.array(place)
+    np.testing.assert_allclose(read_frame(moved, ScanLineParams()).origin, place, atol=0.05)
+    edges = detectEdges(moved) > 0
+    assert near(edges, right) > 0.98
+    assert near(right, edges) > 0.98
+
+
+@pytest.mark.parametrize("place", [(0, 0, 0), (4, 0, 0), (0.3, 0.2, 0.1), (400000, 5e6, 120)])
+def test_a_narrow_scan_is_not_seen_in_parallel(place):
+    rays, ranges, _ = sweep(128, 10, (10, -10))  # columns and walls are upright
+    ranges[40:90, 150:330] *= 0.6  # a card before the wall
+    right = detectEdges(rays * ranges[..., None]) > 0
+    points = rays * ranges[..., None] + np.array(place)
+    frame = read_frame(points, ScanLineParams())
+    assert frame.projective
+    np.testing.assert_allclose(frame.origin, place, atol=0.05)
+    assert right.any()
+    assert near(detectEdges(points) > 0, right) > 0.98
+
+
+@pytest.mark.parametrize("place", [(0, 0, 0), (0.05, 0.02, 0), (-4, -0.3, -0.2), (56, -31, 18), (-900, 1200, -2000)])
+@pytest.mark.parametrize("scene", ["wall", "corner", "card"])
+def test_images_of_few_planes_in_another_frame(scene, place):
+    rays = rays_of()
+    x, y = rays[..., 0], rays[..., 1]
+    z = {"wall": 3 / (1 + 0.3 * x), "corner": 3 / (1 + 0.5 * abs(x - 0.01)), "card": 3 + 0 * x}[scene]
+    z = np.where((abs(x) < 0.2) & (abs(y) < 0.15), 2.0, z) if scene == "card" else z
+    z = z + 0.001 * np.random.default_rng(4).standard_normal(z.shape)
+    right = detectEdges(z, K=K) > 0
+    points = (rays * z[..., None]) @ turned((30, 100, -20)).T + np.array(place)
+    edges = detectEdges(points) > 0
+    assert edges.any() == right.any()
+    if right.any():
+        assert near(edges, right) > 0.98
+        assert near(right, edges) > 0.98
+
+
+def test_rows_of_a_scan_that_are_shifted_are_refused():
+    rays, ranges, _ = sweep(64, 22.5, (180, -180))
+    points = rays * ranges[..., None]
+    raw = np.stack([np.roll(row, (0, 6, 12, 18)[i % 4], axis=0) for i, row in enumerate(points)])
+    with pytest.raises(rangeedge.error, match="by origin"):
+        detectEdges(raw)
+
+
 def test_points_that_are_seen_from_nowhere_are_refused():
     points = np.random.default_rng(3).normal(size=(20, 30, 3)) + np.array([0, 0, 5])
     with pytest.raises(rangeedge.error, match="by origin"):
@@ -189,6 +244,22 @@ def test_points_that_are_seen_from_nowhere_are_refused():
         edgeStrength(good[..., 2], K=K, origin=(0, 0, 0))
     with pytest.raises(rangeedge.error, match="`origin` must be None where heightMap"):
         edgeStrength(good, heightMap=True, origin=(0, 0, 0))
+
+
+def test_the_direction_of_view_is_the_middle_of_a_wide_field():
+    angles = np.linspace(-1.4, 1.4, 60)  # 160 degrees, of which the mean ray has a length of 0.7
+    fan = np.column_stack([np.cos(angles), np.sin(angles), 0 * angles])
+    np.testing.assert_allclose(mean_ray(fan), (1, 0, 0), atol=1e-12)
+    np.testing.assert_allclose(mean_ray(np.concatenate([fan, -fan])), (0, 0, 1))  # that of all around has none
+
+
+@pytest.mark.parametrize("pixel", [(15, 0), (15, -1), (0, 16), (-1, 16)])
+def test_a_wrong_pixel_at_the_end_of_a_line_leaves_the_viewpoint(pixel):
+    z = 2 + 0.3 * np.sin(np.arange(64) / 9) * np.ones((48, 1))
+    v, u = np.indices(z.shape)
+    points = np.dstack([(u - 32) / 60 * z, (v - 24) / 60 * z, z])
+    points[pixel] = (0.5, 1.5, 2)
+    assert view_of(points, None) == View(True)
 
 
 # A lens with distortion.
@@ -217,6 +288,15 @@ def test_a_lens_with_distortion(coefficients):
     assert np.median(found.crease[corner]) == pytest.approx(90, abs=1)
 
 
+def test_rays_through_a_skewed_lens_meet_their_pixels():
+    camera, coefficients = np.array([[180.0, 25, 70], [0, 140, 55], [0, 0, 1]]), np.array([-0.2, 0.06, 0.001, -0.002])
+    rays = distorted_rays(camera, coefficients, (110, 140)).reshape(-1, 1, 3)
+    seen = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), np.eye(3), coefficients)[0][:, 0]
+    pixels = np.column_stack([seen, np.ones(len(seen))]) @ camera.T
+    v, u = np.indices((110, 140))
+    np.testing.assert_allclose(pixels[:, :2], np.column_stack([u.ravel(), v.ravel()]), atol=1e-6)
+
+
 def test_no_distortion_changes_nothing():
     z = depth_of(rays_of())
     for a, b in zip(edgeStrength(z, K=K), edgeStrength(z, K=K, distCoeffs=np.zeros(5)), strict=True):
@@ -241,6 +321,18 @@ def test_surfaces_of_a_sector_are_planes():
     count, _, _, _, surfaces = rangeedge.segmentRegionsWithStats(points)
     assert count - 1 == len(np.unique(faces))
     assert not surfaces["curved"].any()
+
+
+@pytest.mark.parametrize("half", [85, 130])
+def test_surfaces_of_several_sectors_that_do_not_close(half):
+    rays, ranges, faces = sweep(64, 20, (half, -half))
+    points = rays * (ranges + 0.003 * np.random.default_rng(4).standard_normal(ranges.shape))[..., None]
+    labels = segmentRegions(points)
+    for label in range(1, labels.max() + 1):
+        own = np.bincount(faces[labels == label], minlength=len(WALLS))
+        assert own.max() > 0.95 * own.sum()
+    assert np.count_nonzero(labels) > 0.98 * labels.size
+    assert near((detectEdges(points) > 0)[:, 4:-4], borders(faces)[:, 4:-4]) > 0.95
 
 
 @pytest.mark.parametrize("origin", [None, (4, -7, 1.1)])

@@ -8,7 +8,17 @@ import pytest
 import rangeedge
 from rangeedge import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP, EdgeChain, fitSegments, linkEdges
 from rangeedge.chains import CHAIN, POINT
-from rangeedge.synthetic import box, gaussianNoise, pinholeCamera, plane, renderScene, sphere
+from rangeedge.segments import SEGMENT, _variance_along
+from rangeedge.synthetic import (
+    box,
+    gaussianNoise,
+    kinectCamera,
+    kinectNoise,
+    pinholeCamera,
+    plane,
+    renderScene,
+    sphere,
+)
 
 K = np.array([[525.0, 0, 319.5], [0, 525, 239.5], [0, 0, 1]])
 CAMERA = pinholeCamera(K, (640, 480))
@@ -196,3 +206,31 @@ def test_a_short_segment_between_two_others_keeps_its_length():
     assert len(vertices) == 1
     assert segments["vertices"].tolist() == [[0, -1], [0, -1], [0, -1]]
     assert 0.01 < segments["length"][0] < 0.05
+
+
+def test_deviation_of_lengths_between_corners():
+    """Of boxes whose edges are known: none of an end that is no corner, else about as large as the errors are."""
+    sizes, ratios = (0.2, 0.25, 0.3), []
+    for seed in range(6):
+        axes = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+        scene = [plane((0, 0, 1.3), (0.05, -0.3, -1)), box((0, 0, 1.0), sizes, axes)]
+        scan = kinectNoise(renderScene(scene, kinectCamera()), seed=seed)
+        segments = fitSegments(linkEdges(scan.src, **scan.geometry)).segments
+        known = np.isfinite(segments["lengthDeviation"])
+        assert np.array_equal(known, (segments["vertices"] >= 0).all(axis=1))
+        for segment in segments[known & (segments["kind"] == EDGE_CONVEX)]:
+            error = min(abs(segment["length"] - size) for size in sizes)
+            if error < 0.02:  # others are parts of edges
+                ratios.append(error / segment["lengthDeviation"])
+    assert len(ratios) > 5
+    assert 0.3 < np.quantile(ratios, 0.68) < 1.8
+
+
+def test_deviation_of_a_length_is_that_of_the_lines_that_cross_its_ends():
+    """At right angles it is the deviation of these lines, and twice as much where they meet at 30 degrees."""
+    lines = np.zeros(3, SEGMENT)
+    lines["direction"] = (1, 0, 0), (0, 1, 0), (np.cos(np.radians(30)), np.sin(np.radians(30)), 0)
+    lines["endDeviation"] = 5, 0.1, 0.1
+    assert _variance_along(lines, 0, [0, 1]) ** 0.5 == pytest.approx(0.1)
+    assert _variance_along(lines, 0, [0, 2]) ** 0.5 == pytest.approx(0.2)
+    assert _variance_along(lines, 0, [0, 1, 2]) ** -1 == pytest.approx(0.1**-2 + 0.2**-2)

@@ -115,6 +115,14 @@ def test_middle_of_a_bar():
     )
 
 
+@pytest.mark.parametrize("wide", range(1, 6))
+def test_short_bars_are_lines_as_long_as_their_longer_side(wide):
+    for tall in range(wide + 1, 16):
+        bar = np.pad(np.full((tall, wide), 255, np.uint8), 2)
+        for thin in (thinEdges(bar), thinEdges(np.ascontiguousarray(bar.T)).T):
+            assert np.count_nonzero(thin) == np.count_nonzero(thin.any(axis=1)) == tall
+
+
 def test_of_two_middle_rows_the_upper_one():
     assert_thin(
         """
@@ -316,6 +324,18 @@ def test_bands_at_every_angle_are_lines_of_their_length(method, width):
         assert np.abs(across[inner]).max() <= (1.2 if method == THIN_MEDIAL else max(1.2, width / 2))
         if method == THIN_MEDIAL:
             assert np.abs(np.mean(across[inner])) < 0.75
+
+
+@pytest.mark.parametrize("width", [8, 13, 20])
+def test_the_ends_of_a_broad_band_are_reached_in_its_middle(width):
+    """Not at its corners."""
+    rng = np.random.default_rng(5)
+    for degrees in np.arange(0, 180, 7.5):
+        edges, along, across = band(width, degrees, half_length=40, offset=rng.uniform(-1, 1, 2))
+        thin = thinEdges(edges) > 0
+        assert np.abs(across[thin]).max() < 3
+        assert along[thin].min() < -37
+        assert along[thin].max() > 37
 
 
 @every_method

@@ -23,7 +23,7 @@ from ..io.lines import is_line_file, writeLines
 from ..options import CLEANING, DETECTION, GEOMETRY, Cleaning, Growing, Linking
 from .batch import detect_file, read_image
 from .batch_command import BATCH_ARGUMENTS, add_batch_arguments, run_batch
-from .flags import add_detector, add_geometry, add_option, add_options, flag_of, pixel, reader
+from .flags import add_detector, add_geometry, add_option, add_options, flag_of, pixel, reader, save
 from .results import (
     EDGE_FILES,
     REGION_FILES,
@@ -199,18 +199,38 @@ def _help(args: argparse.Namespace) -> int:
 
 
 _NOT_OPTIONS = {
-    *("run", "parser", "image", "params", "out", "real", "repeat", "json", "at", "host", "port", "no_browser"),
+    *(
+        "run",
+        "parser",
+        "image",
+        "params",
+        "save_params",
+        "out",
+        "real",
+        "repeat",
+        "json",
+        "at",
+        "host",
+        "port",
+        "no_browser",
+    ),
     *("segmentTolerance", "straight"),
     *BATCH_ARGUMENTS,
 }
 
 
 def _options(args: argparse.Namespace, known: Collection[str] = DETECTION) -> dict[str, Any]:
-    """The options given, as the keywords of `detectEdges`; they come before those of a file, of which `known` count."""
+    """The options given, as the keywords of `detectEdges`; they come before those of a file, of which `known` count.
+
+    They are saved where that is asked for.
+    """
     given = {name: value for name, value in vars(args).items() if name not in _NOT_OPTIONS}
     placed = {"K", "pixelSize"} if given.keys() & {"K", "pixelSize"} else set()
     saved = getattr(args, "params", {})
-    return {name: value for name, value in saved.items() if name in known and name not in placed} | given
+    options = {name: value for name, value in saved.items() if name in known and name not in placed} | given
+    if "save_params" in args:
+        save(args.save_params, options)
+    return options
 
 
 def _detect(args: argparse.Namespace) -> int:

@@ -13,11 +13,12 @@ import numpy as np
 from .._option import Option
 from ..detector import createScanLineDetector
 from ..options import DETECTION, GEOMETRY, SCAN_LINES, SELECTION, Growing
-from .texts import GROUPS, PARAMS
+from .texts import GROUPS, PARAMS, SAVE_PARAMS
 
 
 def add_geometry(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--params", type=reader(_saved), metavar="FILE", help=PARAMS)
+    parser.add_argument("--save-params", dest="save_params", metavar="FILE", help=SAVE_PARAMS)
     group = parser.add_argument_group("geometry of the image")
     projection = group.add_mutually_exclusive_group()
     for name, option in GEOMETRY.items():
@@ -96,6 +97,15 @@ def _saved(path: str) -> dict[str, Any]:
     detector.load(path)
     values = {name: getattr(detector, f"get{name[0].upper()}{name[1:]}")() for name in DETECTION}
     return {name: value for name, value in values.items() if not np.array_equal(value, DETECTION[name].default)}
+
+
+def save(path: str, options: Mapping[str, Any]) -> None:
+    """Save the parameters of the detector among the options, for --params."""
+    detector = createScanLineDetector()
+    for name, value in options.items():
+        if name in DETECTION:
+            getattr(detector, f"set{name[0].upper()}{name[1:]}")(value)
+    detector.save(path)
 
 
 def pixel(text: str) -> tuple[int, int]:

@@ -12,13 +12,14 @@ from .. import __version__
 from .._check import named
 from .._option import parsed, takes
 from ..chains import EdgeChains, link_frame
-from ..draw import drawSegments, line_overview
+from ..draw import line_overview
+from ..draw.lines import canvas_of, draw_segments, write_lengths
 from ..frame import Frame
 from ..io import RangeImage
 from ..io.lines import encoded_lines
 from ..noise import measured_frame
 from ..options import LINKING, Linking, ScanLineParams, Selection
-from ..plausible import warn_of_thresholds
+from ..plausible import warn_of_selection
 from ..segments import Segments, fitSegments
 from .results import encoded, on_map, plain
 from .understood import understood
@@ -59,7 +60,7 @@ def find_lines(
     """The chains of an image, their segments, and what is known of the image."""
     params, selection, linking = parsed(options, ScanLineParams, Selection, Linking)
     frame = measured_frame(src, params, mask)
-    warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
+    warn_of_selection(frame, selection)
     chains = link_frame(frame, params, selection, linking)
     segments, vertices = fitSegments(chains, tolerance)
     return LineResults(frame, chains, segments, vertices, understood(frame, params, selection, src))
@@ -70,8 +71,11 @@ def line_files(found: LineResults, title: str, options: Mapping[str, Any], image
     view = {name: image.geometry[name] for name in ("K", "heightMap") if name in image.geometry}
     scale = min(max(1, -(-_SCALE_PIXELS // image.src.shape[1])), 16)
     segments = Segments(found.segments, found.vertices)
-    picture = drawSegments(image.src, *segments, scale=scale, lengths=True, **view)
-    caption = f"{title}: {len(found.segments)} segments and their lengths, unit: {found.known['unit']}"
+    picture, scale = canvas_of(image.src, scale, view)
+    draw_segments(picture, *segments, scale)
+    crowded = len(found.segments) - write_lengths(picture, *segments, scale)
+    room = f" ({crowded} without room)" if crowded else ""
+    caption = f"{title}: {len(found.segments)} segments and their lengths{room}, unit: {found.known['unit']}"
     report = {
         "image": title,
         "rangeedge": __version__,
@@ -88,7 +92,7 @@ def line_files(found: LineResults, title: str, options: Mapping[str, Any], image
         "noise": plain(found.frame.noise),
     }
     return {
-        "lines.png": encoded(".png", line_overview(picture, caption)),
+        "lines.png": encoded(".png", line_overview(picture, found.frame.shape, caption)),
         "chains.csv": encoded_lines(".csv", found.chains),
         "chains.ply": encoded_lines(".ply", found.chains),
         "chains.geojson": encoded_lines(".geojson", found.chains, **on_map(image)),

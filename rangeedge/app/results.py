@@ -22,9 +22,9 @@ from .. import __version__
 from .._check import described, error, named
 from .._option import parsed, takes
 from ..boundaries import RegionBoundaries, boundaries_of
-from ..detector import selected, thin_lines
+from ..detection import selected, thin_lines
 from ..distance import distanceTransform
-from ..draw import drawOverview, drawRegions, region_overview
+from ..draw import drawRegions, edge_overview, region_overview
 from ..edges import EdgeStrength, measure_both
 from ..frame import Frame
 from ..io import RangeImage
@@ -32,7 +32,7 @@ from ..io.atomic import nameless, put
 from ..io.lines import encoded_lines
 from ..noise import measured_frame
 from ..options import DETECTION, Growing, ScanLineParams, Selection
-from ..plausible import warn_of_thresholds
+from ..plausible import warn_of_selection
 from ..regions import described_regions, seeded_regions
 from ..sectors import around
 from .understood import understood
@@ -94,7 +94,7 @@ def find_edges(src: np.ndarray, *, mask: np.ndarray | None = None, **options: An
 
 def _edges_of(src: np.ndarray, mask: np.ndarray | None, params: ScanLineParams, selection: Selection) -> EdgeResults:
     frame = measured_frame(src, params, mask)
-    warn_of_thresholds(frame, jumpThreshold=selection.jumpThreshold)
+    warn_of_selection(frame, selection)
     strength, points = measure_both(frame, params)
     edges = selected(frame, strength, selection.of(params))
     thin = thin_lines(frame, edges)
@@ -125,9 +125,7 @@ def find_regions(src: np.ndarray, *, mask: np.ndarray | None = None, **options: 
 
 def edge_files(found: EdgeResults, title: str, options: Mapping[str, Any]) -> dict[str, bytes]:
     """The files of EDGE_FILES."""
-    overview = drawOverview(
-        found.surface, found.strength, found.thin, found.distance, title=title, heightMap=found.frame.heightMap
-    )
+    overview = edge_overview(found.frame, found.strength, found.thin, found.distance, title)
     return {
         "overview.png": encoded(".png", overview),
         "thin.png": encoded(".png", found.thin),
@@ -162,15 +160,7 @@ def region_files(
         raise error(f"labels.png has room for {_LABELS} regions, {count} were found; raise `minArea`")
     if seeds > _LABELS:
         raise error(f"seeds.png has room for {_LABELS} seeds, {seeds} were found; raise `minDistance`")
-    overview = region_overview(
-        edges.surface,
-        found.seeds,
-        edges.thin,
-        edges.strength.kind,
-        found.labels,
-        title=title,
-        heightMap=edges.frame.heightMap,
-    )
+    overview = region_overview(edges.frame, found.seeds, edges.thin, edges.strength.kind, found.labels, title)
     outlines = outlines_of(found)
     picture = drawRegions(found.labels, edges.surface, alpha=0.3, heightMap=edges.frame.heightMap)
     return {

@@ -20,6 +20,7 @@ from ..io import RangeImage
 from ..plausible import collected
 from ..recording import FrameSource
 from ..recording.manifest import Line, Manifest, changed, complete
+from ..recording.workers import expect_guard
 from .results import plain
 from .tasks import Counts
 
@@ -89,6 +90,7 @@ def run_frames(
     job: Job, frames: list[FrameSource], manifest: Manifest, force: bool, **workers: Any
 ) -> Iterator[BatchItem]:
     """What becomes of each frame, in their order, each when it and those before it are done."""
+    expect_guard(workers.get("jobs", 1))
     _expect_apart(job, frames)
     with manifest.opened():
         _sweep(job.out)

@@ -19,6 +19,9 @@ taken as a regular grid."""
 
 PARAMS = """A file of options, saved in the explorer or by ScanLineDetector.save; flags given beside it come first."""
 
+SAVE_PARAMS = """Save the options of the detector, these and those of --params, as --params and ScanLineDetector.load
+take them: .yml, .xml or .json."""
+
 DETAILS = {  # what a command does, in more than its purpose
     "detect": """\
 Tell how the image was taken (-K of a camera, --pixel-size of a grid). All else has defaults that follow the
@@ -57,7 +60,8 @@ EPILOGUES = {
   rangeedge detect depth.png -K 525,525,319.5,239.5 --out edges     # 16-bit millimetres of a depth camera
   rangeedge detect terrain.tiff --pixel-size 0.5 --height-map --out edges
   rangeedge detect cloud.pcd --crease-threshold 20 --out edges
-  rangeedge detect depth.png --params detector.yml --out edges      # saved in the explorer""",
+  rangeedge detect depth.png --crease-threshold 20 --save-params detector.yml --out edges
+  rangeedge detect other.png --params detector.yml --out edges      # the same options, or those of the explorer""",
     "segment": """examples:
   rangeedge segment depth.png -K 525,525,319.5,239.5 --out regions
   rangeedge segment cloud.pcd --min-area 300 --out regions

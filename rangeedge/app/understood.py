@@ -22,11 +22,9 @@ def understood(frame: Frame, params: ScanLineParams, selection: Selection, src: 
     if frame.heightMap:
         depths = -depths
     middle = float(np.median(depths)) if len(depths) else None
-    factor = params.depthFactor
-    integers = np.asarray(src).dtype.kind in "iu"
     return {
         "geometry": _geometry(frame, params),
-        "unit": f"stored values / {factor:g}" if integers else "that of the stored values",
+        "unit": _unit(frame, params),
         "depthRange": [float(depths.min()), float(depths.max())] if len(depths) else None,
         "medianDepth": middle,
         "pixelSpacing": _spacing(frame),
@@ -49,6 +47,13 @@ def sentence(known: dict[str, Any]) -> str:
         f" noise {known['noiseAtMedian']:.2g} at the median {known['medianDepth']:.4g}; jumps"
         f" {jump if isinstance(jump, str) else f'from {jump:g}'}, creases from {known['creaseThreshold']:g} degrees"
     )
+
+
+def _unit(frame: Frame, params: ScanLineParams) -> str:
+    """Of lengths, as far as it is known."""
+    if frame.unit == "m":
+        return "m (stored in mm)"
+    return f"units of {params.depthFactor:g} stored steps" if frame.step else "units of the stored values"
 
 
 def _geometry(frame: Frame, params: ScanLineParams) -> str:

@@ -5,7 +5,7 @@ from .distance import colorizeDistance
 from .edges import drawEdges
 from .explanation import drawExplanation
 from .lines import drawArcs, drawChains, drawSegments
-from .overview import drawOverview, drawPanels, line_overview, region_overview
+from .overview import drawOverview, drawPanels, edge_overview, line_overview, region_overview
 from .regions import drawRegions
 
 __all__ = [
@@ -19,6 +19,7 @@ __all__ = [
     "drawPanels",
     "drawRegions",
     "drawSegments",
+    "edge_overview",
     "line_overview",
     "region_overview",
 ]

@@ -30,8 +30,9 @@ def drawEdges(
 
     drawEdges(src, edges[, kind[, dst]], *[, K[, ...]]) -> dst
 
-    With `kind`: jump vermilion on the near side and purple on the far side, convex yellow, concave blue, beside no data
-    grey, anything else white; a jump hides a crease. Without it every edge is white. Pixels without data are hatched.
+    With `kind`: jump vermilion on the nearer side and purple on the farther side, convex yellow, concave blue, beside
+    no data grey, anything else white; a jump hides a crease. Without it every edge is white. Pixels without data are
+    hatched.
 
     Parameters
     ----------
@@ -40,7 +41,7 @@ def drawEdges(
     edges : ndarray of shape (H, W), CV_8U or bool
         Edge map, non-zero on edges.
     kind : ndarray of shape (H, W), CV_8U, optional
-        Bits `EDGE_JUMP`, `EDGE_CONVEX`, ... of every pixel, as :func:`edgeStrength` returns them.
+        Bits `EDGE_JUMP`, `EDGE_CONVEX`, ... of every pixel, as `edgeStrength` returns them.
     dst : ndarray of shape (H, W, 3), CV_8U, optional
         Receives the result where shape and type fit; it may be `src` itself.
     {options}

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+
 import cv2
 import numpy as np
 
 from .. import _check
-from ..explain import Cut, Explanation, ScanLine
-from .palette import kind_colour
+from ..edges import kind_in_words
+from ..explain import Explanation
+from ..traces import Cut, ScanLine
+from .palette import KINDS, kind_colour
 
 _WIDTH, _HEIGHT, _LEFT, _RIGHT, _TOP, _BOTTOM = 620, 300, 74, 12, 34, 30
 _PAPER, _INK, _AXIS, _FAINT = (255, 255, 255), (40, 40, 40), (150, 150, 150), (190, 190, 190)
@@ -16,6 +20,7 @@ _CURVES = ((178, 114, 0), (115, 158, 0))  # of neighbouring segments, in turn
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _SIZE = 0.46  # of text
 _SHIFT = 4  # binary digits of fractions of a pixel
+_SYMBOL = 34  # width of what the key explains
 
 
 @_check.public
@@ -27,7 +32,7 @@ def drawExplanation(explanation: Explanation) -> np.ndarray:
     One panel a direction, after Figure 3 of the paper: depth (or height) over pixels along the line. Dots are
     samples, the pale band is the tolerance of splitting around the curves, which are blue and green in turn; cuts that
     are candidates of edges are full vertical lines in the colours of `drawEdges`, those that failed a test are broken
-    grey ones, each with its number in the text below the panel. The pixel is ringed.
+    grey ones, each with its number in the text below the panel. The pixel is ringed. A key explains all of this.
 
     Parameters
     ----------
@@ -56,11 +61,11 @@ def drawExplanation(explanation: Explanation) -> np.ndarray:
     head = [line.strip() for line in str(explanation).splitlines()]
     head = head[: next((i for i, line in enumerate(head) if line.split(":")[0] in _DIRECTIONS), len(head))]
     columns = 2 if len(explanation.lines) > 1 else 1
-    panels = [_panel(line) for line in explanation.lines]
+    panels = [_panel(line, explanation.unit) for line in explanation.lines]
     panels += [np.full((_HEIGHT + _notes_height(), _WIDTH, 3), _PAPER, np.uint8)] * (-len(panels) % columns)
     rows = [np.hstack(panels[i : i + columns]) for i in range(0, len(panels), columns)]
     width = rows[0].shape[1] if rows else 2 * _WIDTH
-    return np.vstack([_text(_wrapped(head, width), width), *rows])
+    return np.vstack([_text(_wrapped(head, width), width), *rows, *([_key(explanation, width)] if rows else [])])
 
 
 _DIRECTIONS = ("row", "column", "diagonal 45", "diagonal 135")
@@ -76,6 +81,65 @@ def _text(lines: list[str], width: int) -> np.ndarray:
     for i, line in enumerate(lines):
         _write(picture, line, (10, _LINE * (i + 1)), _SIZE)
     return picture
+
+
+def _key(explanation: Explanation, width: int) -> np.ndarray:
+    """What dots, bands and lines mean; of kinds those that are there."""
+    seen = {kind_colour(cut.bits) for line in explanation.lines for cut in line.cuts if not cut.test}
+    wider = f", {explanation.correlation:.2g} times wider as noise is correlated" if explanation.correlated else ""
+    entries = [
+        (_symbol_of_samples, "samples, the pixel ringed"),
+        (_symbol_of_band, f"tolerance around the curves of segments{wider}"),
+        *((_symbol_of_kind(colour), f"candidate: {text}") for _, colour, text in reversed(KINDS) if colour in seen),
+        (_symbol_of_lost, "cut that failed a test"),
+    ]
+    lines, x = [np.full((_LINE + 6, width, 3), _PAPER, np.uint8)], 10
+    for symbol, text in entries:
+        needed = _SYMBOL + 28 + cv2.getTextSize(text, _FONT, _SIZE, 1)[0][0]
+        if x > 10 and x + needed > width:
+            lines.append(np.full_like(lines[0], _PAPER))
+            x = 10
+        symbol(lines[-1][:, x : x + _SYMBOL])
+        _write(lines[-1], text, (x + _SYMBOL + 8, _LINE - 2), _SIZE)
+        x += needed
+    return np.vstack(lines)
+
+
+def _symbol_of_samples(picture: np.ndarray) -> None:
+    y = len(picture) // 2
+    for x in (6, 17, 28):
+        _dot(picture, (x << _SHIFT, y << _SHIFT))
+    cv2.circle(picture, (17, y), 8, _PIXEL, 2, cv2.LINE_AA)
+
+
+def _symbol_of_band(picture: np.ndarray) -> None:
+    y = len(picture) // 2
+    picture[y - 8 : y + 9] = _BAND
+    for colour, x in zip(_CURVES, (0, _SYMBOL // 2), strict=True):
+        cv2.line(picture, (x, y), (x + _SYMBOL // 2 - 2, y), colour, 2)
+
+
+def _symbol_of_kind(colour: tuple[int, int, int]) -> Callable[[np.ndarray], None]:
+    return lambda picture: _full_line(picture, _SYMBOL // 2, 2, len(picture) - 3, colour)
+
+
+def _symbol_of_lost(picture: np.ndarray) -> None:
+    _broken_line(picture, _SYMBOL // 2, 2, len(picture) - 3)
+
+
+def _dot(picture: np.ndarray, place: Sequence[int]) -> None:
+    """Of a sample, at a place in fractions of a pixel."""
+    cv2.circle(picture, place, 3 << _SHIFT, _SAMPLES, cv2.FILLED, cv2.LINE_AA, _SHIFT)
+
+
+def _full_line(picture: np.ndarray, x: int, top: int, bottom: int, colour: tuple[int, int, int]) -> None:
+    cv2.line(picture, (x, top), (x, bottom), _INK, 4)
+    cv2.line(picture, (x, top), (x, bottom), colour, 2)
+
+
+def _broken_line(picture: np.ndarray, x: int, top: int, bottom: int) -> None:
+    for y in range(top, bottom, 8):
+        cv2.line(picture, (x, y), (x, min(y + 3, bottom)), _FAINT, 1)
 
 
 def _write(
@@ -127,11 +191,11 @@ class _Plot:
         return np.rint(places * (1 << _SHIFT)).astype(np.int32)
 
 
-def _panel(line: ScanLine) -> np.ndarray:
+def _panel(line: ScanLine, unit: str) -> np.ndarray:
     panel = np.full((_HEIGHT, _WIDTH, 3), _PAPER, np.uint8)
     plot = _Plot(line)
     _bands(panel, plot, line)
-    _axes(panel, plot, line)
+    _axes(panel, plot, line, unit)
     near = sorted(line.cuts, key=lambda cut: abs(cut.sample - line.at))[:_NOTES]
     noted = sorted(near, key=lambda cut: cut.sample)
     for cut in line.cuts:
@@ -139,12 +203,12 @@ def _panel(line: ScanLine) -> np.ndarray:
     _curves(panel, plot, line)
     seen = np.flatnonzero(np.isfinite(line.samples["depth"]))
     for place in plot.at(seen, line.samples["depth"][seen]).tolist():
-        cv2.circle(panel, place, 5 << (_SHIFT - 1), _SAMPLES, cv2.FILLED, cv2.LINE_AA, _SHIFT)
+        _dot(panel, place)
     here = plot.at(np.array([line.at]), line.samples["depth"][[line.at]])[0].tolist()
     cv2.circle(panel, here, 8 << _SHIFT, _PIXEL, 2, cv2.LINE_AA, _SHIFT)
     for i, cut in enumerate(noted, 1):
         _number_cut(panel, int(plot.x(cut.sample)), i)
-    notes = [f"{i}  {cut.kind}: {cut.fate}." for i, cut in enumerate(noted, 1)]
+    notes = [f"{i}  {kind_in_words(cut.bits)}: {cut.fate}." for i, cut in enumerate(noted, 1)]
     below = _text(_wrapped(notes or ["no cut"], _WIDTH)[: 2 * _NOTES], _WIDTH)
     below = cv2.copyMakeBorder(
         below[: _notes_height()], 0, max(0, _notes_height() - len(below)), 0, 0, cv2.BORDER_CONSTANT, value=_PAPER
@@ -152,7 +216,7 @@ def _panel(line: ScanLine) -> np.ndarray:
     return np.vstack([panel, below])
 
 
-def _axes(panel: np.ndarray, plot: _Plot, line: ScanLine) -> None:
+def _axes(panel: np.ndarray, plot: _Plot, line: ScanLine, unit: str) -> None:
     cv2.rectangle(panel, (_LEFT, _TOP), (_WIDTH - _RIGHT, _HEIGHT - _BOTTOM), _AXIS, 1)
     first, last = (f"({line.samples['x'][i]:.0f}, {line.samples['y'][i]:.0f})" for i in (0, -1))
     _write(panel, f"{line.name}, from {first} to {last}", (_LEFT, _TOP - 12), 0.5)
@@ -162,7 +226,8 @@ def _axes(panel: np.ndarray, plot: _Plot, line: ScanLine) -> None:
         cv2.line(panel, (_LEFT - 4, y), (_LEFT, y), _AXIS, 1)
         text = f"{value:.{digits}f}"
         _write_before(panel, text, y + 5)
-    _write_before(panel, "height" if plot.upright else "depth", _TOP - 12)
+    name = "height" if plot.upright else "depth"
+    _write_before(panel, f"{name}, {unit}" if unit else name, _TOP - 12)
     _write_before(panel, "pixels", _HEIGHT - _BOTTOM + 19)
     for offset in range(-plot.count // 10 * 10, plot.count, 10):
         if 0 <= line.at + offset < plot.count:
@@ -197,6 +262,7 @@ def _bands(panel: np.ndarray, plot: _Plot, line: ScanLine) -> None:
             fitted, off = line.samples["fittedDepth"][part], line.samples["toleranceDepth"][part]
             outline = np.concatenate([plot.at(part, fitted - off), plot.at(part, fitted + off)[::-1]])
             cv2.fillPoly(panel, [outline], _BAND, cv2.LINE_AA, _SHIFT)
+    panel[:_TOP] = panel[_HEIGHT - _BOTTOM :] = _PAPER
 
 
 def _curves(panel: np.ndarray, plot: _Plot, line: ScanLine) -> None:
@@ -208,12 +274,10 @@ def _curves(panel: np.ndarray, plot: _Plot, line: ScanLine) -> None:
 
 def _draw_cut(panel: np.ndarray, plot: _Plot, cut: Cut) -> None:
     x = int(plot.x(cut.sample))
-    if not cut.test:
-        cv2.line(panel, (x, _TOP), (x, _HEIGHT - _BOTTOM), _INK, 4)
-        cv2.line(panel, (x, _TOP), (x, _HEIGHT - _BOTTOM), kind_colour(cut.bits), 2)
+    if cut.test:
+        _broken_line(panel, x, _TOP, _HEIGHT - _BOTTOM)
     else:
-        for y in range(_TOP, _HEIGHT - _BOTTOM, 8):
-            cv2.line(panel, (x, y), (x, y + 3), _FAINT, 1)
+        _full_line(panel, x, _TOP, _HEIGHT - _BOTTOM, kind_colour(cut.bits))
 
 
 def _number_cut(panel: np.ndarray, x: int, number: int) -> None:

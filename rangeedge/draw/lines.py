@@ -28,7 +28,7 @@ _VERTEX = (255, 255, 255)
 _INK, _HALO = (255, 255, 255), (0, 0, 0)
 _BESIDE = (4, -4)  # pixels of the picture, from a place to the text about it
 _PLACES = (0.5, 0.35, 0.65, 0.2, 0.8)  # along a segment, for its length
-_LEAST_SEEN = 0.5  # of the width of a text, that a segment has for it
+_APART = 4  # pixels between texts
 
 
 @takes(GEOMETRY)
@@ -139,13 +139,18 @@ def drawSegments(
             raise fail(name, "a structured array from fitSegments", described(value))
     lengths = boolean("lengths", lengths)
     canvas, scale = canvas_of(src, scale, geometry)
+    ends = np.zeros(0, VERTEX) if vertices is None else vertices
+    draw_segments(canvas, segments, ends, scale)
+    if lengths:
+        write_lengths(canvas, segments, ends, scale)
+    return deliver("dst", canvas, dst)
+
+
+def draw_segments(canvas: np.ndarray, segments: np.ndarray, vertices: np.ndarray, scale: int) -> None:
     for segment in segments:
         _line(canvas, segment["pixels"], int(segment["kind"]), scale)
-    for vertex in vertices if vertices is not None else ():
+    for vertex in vertices:
         _dot(canvas, np.array([vertex["x"], vertex["y"]]), _VERTEX, scale)
-    if lengths:
-        _write_lengths(canvas, segments, scale)
-    return deliver("dst", canvas, dst)
 
 
 @takes(GEOMETRY)
@@ -234,24 +239,32 @@ def _dot(canvas: np.ndarray, place: np.ndarray, colour: tuple[int, int, int], sc
     cv2.circle(canvas, (x, y), (scale + 1) << _SHIFT, colour, cv2.FILLED, cv2.LINE_AA, _SHIFT)
 
 
-def _write_lengths(canvas: np.ndarray, segments: np.ndarray, scale: int) -> None:
-    """Lengths beside segments, of which the long ones choose first, where no other is written."""
-    taken = np.zeros(canvas.shape[:2], bool)
+def write_lengths(canvas: np.ndarray, segments: np.ndarray, vertices: np.ndarray, scale: int) -> int:
+    """Lengths beside segments, of which the long ones choose first, where nothing else is; the result is how many.
+
+    Neither other lengths are, nor vertices; and a segment is no shorter than the text about it.
+    """
+    taken = np.zeros(canvas.shape[:2], np.uint8)
+    for vertex in vertices:
+        _dot(taken, np.array([vertex["x"], vertex["y"]]), (1, 1, 1), scale)
+    count = 0
     seen = scale * np.linalg.norm(segments["pixels"][:, 1] - segments["pixels"][:, 0], axis=1)
     for i in np.argsort(-seen, kind="stable"):
         text = f"{segments['length'][i]:.3g}"
         (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, _text_size(scale), 1)
-        if seen[i] < _LEAST_SEEN * width:
-            continue
+        if seen[i] < width:
+            break
         first, last = segments["pixels"][i]
         for share in _PLACES:
             place = first + share * (last - first)
             x, y = (fixed(place, scale) >> _SHIFT) + _BESIDE
-            box = np.s_[max(y - height - 3, 0) : y + 4, max(x - 3, 0) : x + width + 3]
+            box = np.s_[max(y - height - _APART, 0) : y + _APART + 1, max(x - _APART, 0) : x + width + _APART]
             if min(x, y - height) >= 0 and x + width < taken.shape[1] and y < len(taken) and not taken[box].any():
-                taken[box] = True
+                taken[box] = 1
                 _label(canvas, place, text, scale)
+                count += 1
                 break
+    return count
 
 
 def _text_size(scale: int) -> float:

@@ -10,23 +10,24 @@ import numpy as np
 
 from .. import _check
 from .._option import parsed, takes
-from ..frame import read_frame
+from ..constants import EDGE_BOUNDARY
+from ..edges import EdgeStrength
+from ..frame import Frame, read_frame
 from ..options import GEOMETRY, ScanLineParams
 from ..selection import strengthImage
 from .distance import checked_distance, distance_colours
-from .palette import EDGE_KINDS, LINE_KINDS, colour_index, paint
-from .regions import drawRegions
+from .palette import LINE_KINDS, colour_index, paint
+from .regions import drawRegions, write_numbers
 from .relief import hatch, relief_of, subdued
+from .sheet import BACKGROUND, key_to, sentence, sheet, with_axes
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from .._typed import GeometryOptions
 
-_BACKGROUND = (32, 32, 32)
-_INK = (235, 235, 235)
-_FONT, _FONT_SCALE, _BAR = cv2.FONT_HERSHEY_SIMPLEX, 0.55, 28
 _PANEL_MIN, _PANEL_MAX = 320, 640  # longer side of a panel in pixels
+_SMALL_HOLE = 3  # pixels that a hole is narrower than, whose rim is not shown
 
 
 @takes(GEOMETRY)
@@ -45,15 +46,17 @@ def drawOverview(
 
     drawOverview(src, strength, edges[, distance], *[, title[, jumpCut[, creaseCut[, K[, ...]]]]]) -> retval
 
-    The panels: shaded relief, strength of jump and of crease, the kinds of all candidates, the selected edges over
-    the relief, and the distance map; below them the key to the colours.
+    The panels: shaded relief, strength of jump and of crease, the kinds of all candidates (but for the rims of holes
+    narrower than three pixels), the selected edges over the relief, and the distance map, with rows and columns
+    numbered; below them the key to the colours. Lengths are in metres where the image holds integers and `depthFactor`
+    is 1000, else in its units.
 
     Parameters
     ----------
     src : ndarray
         Range image (H, W), or points (H, W, 3) or (H, W, 4) of floats.
     strength : EdgeStrength
-        What :func:`edgeStrength` returns: jump, crease, kind and significance, each (H, W).
+        What `edgeStrength` returns: jump, crease, kind and significance, each (H, W).
     edges : ndarray of shape (H, W), CV_8U or bool
         Selected edges, non-zero on edges.
     distance : ndarray of shape (H, W), CV_32F, optional
@@ -83,32 +86,62 @@ def drawOverview(
     >>> drawOverview(depth, (none, none, kind, none), kind).dtype
     dtype('uint8')
     """
-    depth = read_frame(src, parsed(geometry, ScanLineParams)[0]).depth
-    jump, crease, kind = _strength(strength, depth.shape)
-    edges = _check.image8("edges", edges, depth.shape) != 0
+    frame = read_frame(src, parsed(geometry, ScanLineParams)[0])
+    jump, crease, kind = _strength(strength, frame.shape)
+    edges = _check.image8("edges", edges, frame.shape) != 0
     if distance is not None:
-        distance = checked_distance(distance, depth.shape)
+        distance = checked_distance(distance, frame.shape)
     if title is not None and not isinstance(title, str):
         raise _check.fail("title", "a string or None", type(title).__name__)
     if jumpCut is None:
         jumpCut = float(np.median(jump[jump > 0])) if jump.any() else 1.0
     jumpCut = _check.number("jumpCut", jumpCut, 0, above=True)
     creaseCut = _check.number("creaseCut", creaseCut, 0, above=True)
+    return _edge_sheet(frame, (jump, crease, kind), edges, distance, title, (jumpCut, creaseCut))
 
+
+def edge_overview(
+    frame: Frame, strength: EdgeStrength, edges: np.ndarray, distance: np.ndarray, title: str
+) -> np.ndarray:
+    """What `drawOverview` draws, of a checked range image."""
+    jumps = strength.jump[strength.jump > 0]
+    cuts = float(np.median(jumps)) if jumps.size else 1.0, 64.0
+    return _edge_sheet(frame, strength[:3], edges != 0, distance, title, cuts)
+
+
+def _edge_sheet(
+    frame: Frame,
+    strength: tuple[np.ndarray, ...],
+    edges: np.ndarray,
+    distance: np.ndarray | None,
+    title: str | None,
+    cuts: tuple[float, float],
+) -> np.ndarray:
+    jump, crease, kind = strength
+    depth, unit = np.float32(frame.depth), frame.unit or "units"
+    valid = np.isfinite(depth)
     size = _panel_size(depth.shape)
     relief = _resized(relief_of(depth), size)
     black = np.zeros_like(relief)
+    shown = np.where(_beside_small_holes(valid), kind & ~np.uint8(EDGE_BOUNDARY), kind)
     panels = [
-        (_depth_caption(depth, geometry.get("heightMap", False)), relief),
-        (f"Jump strength, white from {jumpCut:.3g}", _grey(jump, jumpCut, size)),
-        (f"Crease strength, white from {creaseCut:.3g} deg", _grey(crease, creaseCut, size)),
-        ("Kinds of all candidates", paint(black, _thick(colour_index(kind != 0, kind), size))),
+        (_depth_caption(frame), relief),
+        (f"Jump strength, white from {cuts[0]:.3g} {unit}", _grey(jump, cuts[0], size)),
+        (f"Crease strength, white from {cuts[1]:.3g} degrees", _grey(crease, cuts[1], size)),
+        ("Kinds of all candidates", paint(black, _thick(colour_index(shown != 0, shown), size))),
         ("Selected edges", paint(subdued(relief), _thick(colour_index(edges, kind), size))),
     ]
     if distance is not None:
-        caption, picture = _distance_panel(distance, np.isfinite(depth))
+        caption, picture = _distance_panel(distance, valid)
         panels.append((caption, _resized(picture, size)))
-    return _sheet(panels, title)
+    return sheet([(caption, with_axes(picture, depth.shape)) for caption, picture in panels], title)
+
+
+def _beside_small_holes(valid: np.ndarray) -> np.ndarray:
+    """Pixels beside no other hole than such as no square of three pixels fits into."""
+    square = np.ones((_SMALL_HOLE, _SMALL_HOLE), np.uint8)
+    large = cv2.morphologyEx((~valid).view(np.uint8), cv2.MORPH_OPEN, square, borderValue=1)
+    return cv2.dilate(large, np.ones((3, 3), np.uint8)) == 0
 
 
 @_check.public
@@ -158,41 +191,37 @@ def drawPanels(
     height, width = (max(picture.shape[axis] for _, picture in pictures) for axis in (0, 1))
     full = []
     for title, picture in pictures:
-        sheet = np.full((height, width, 3), _BACKGROUND, np.uint8)
-        sheet[: picture.shape[0], : picture.shape[1]] = picture
-        full.append((title, sheet))
+        canvas = np.full((height, width, 3), BACKGROUND, np.uint8)
+        canvas[: picture.shape[0], : picture.shape[1]] = picture
+        full.append((title, canvas))
     columns = None if columns is None else min(_check.integer("columns", columns, 1), len(full))
-    return _sheet(full, None, columns, key=_check.boolean("key", key))
+    return sheet(full, None, columns, key=_check.boolean("key", key))
 
 
-def line_overview(picture: np.ndarray, caption: str) -> np.ndarray:
-    """A picture of lines under a caption, with the key to their colours."""
-    return np.vstack([*_sentence(caption, picture.shape[1]), picture, _key(picture.shape[1], LINE_KINDS)])
+def line_overview(picture: np.ndarray, shape: tuple[int, int], caption: str) -> np.ndarray:
+    """A picture of lines in an image of this shape under a caption, with the key to their colours."""
+    framed = with_axes(picture, shape)
+    return np.vstack([*sentence(caption, framed.shape[1]), framed, key_to(framed.shape[1], LINE_KINDS)])
 
 
 def region_overview(
-    surface: np.ndarray,
-    seeds: np.ndarray,
-    edges: np.ndarray,
-    kind: np.ndarray,
-    labels: np.ndarray,
-    *,
-    title: str,
-    heightMap: bool = False,
+    frame: Frame, seeds: np.ndarray, edges: np.ndarray, kind: np.ndarray, labels: np.ndarray, title: str
 ) -> np.ndarray:
     """Range image, edges, seeds and regions in one labelled picture, after the manner of `drawOverview`."""
-    depth = read_frame(surface, ScanLineParams(heightMap=heightMap)).depth
+    depth = np.float32(frame.depth)
     size = _panel_size(depth.shape)
     relief = _resized(relief_of(depth), size)
-    seeds, regions = (_resized(drawRegions(part, subdued(relief_of(depth)), 0.8), size) for part in (seeds, labels))
+    sown, regions = (_resized(drawRegions(part, subdued(relief_of(depth)), 0.8), size) for part in (seeds, labels))
     thin = _thick(colour_index(edges != 0, kind), size)
+    count, numbered = len(np.unique(labels[labels > 0])), write_numbers(regions, labels)
+    how = "" if numbered == count else f" ({count - numbered} without room)"
     panels = [
-        (_depth_caption(depth, heightMap), relief),
+        (_depth_caption(frame), relief),
         ("Edges", paint(subdued(relief), thin)),
-        ("Seeds", seeds),
-        (f"{len(np.unique(labels[labels > 0]))} regions", regions),
+        (f"{len(np.unique(seeds[seeds > 0]))} seeds", sown),
+        (f"{count} regions, numbered by label{how}", regions),
     ]
-    return _sheet(panels, title)
+    return sheet([(caption, with_axes(picture, depth.shape)) for caption, picture in panels], title)
 
 
 def _strength(strength: tuple[np.ndarray, ...], shape: tuple[int, int]) -> tuple[np.ndarray, ...]:
@@ -230,13 +259,14 @@ def _thick(image: np.ndarray, size: tuple[int, int]) -> np.ndarray:
     return cv2.resize(cv2.dilate(image, np.ones((step, step), np.uint8)), size, interpolation=cv2.INTER_NEAREST)
 
 
-def _depth_caption(depth: np.ndarray, heightMap: bool) -> str:
-    name, sign = ("Height", -1) if heightMap else ("Depth", 1)
-    values = sign * depth[np.isfinite(depth)]
+def _depth_caption(frame: Frame) -> str:
+    name, sign = ("Height", -1) if frame.heightMap else ("Depth", 1)
+    values = sign * frame.depth[frame.valid > 0]
     if not values.size:
         return f"{name}: no data"
-    colours = "high bright" if heightMap else "near bright"
-    return f"{name} {values.min():.4g} to {values.max():.4g}, {colours}, {100 * values.size / depth.size:.0f} % valid"
+    colours = "high bright" if frame.heightMap else "near bright"
+    share = 100 * values.size / frame.valid.size
+    return f"{name} {values.min():.4g} to {values.max():.4g} {frame.unit or 'units'}, {colours}, {share:.0f} % valid"
 
 
 def _distance_panel(distance: np.ndarray, valid: np.ndarray) -> tuple[str, np.ndarray]:
@@ -244,71 +274,5 @@ def _distance_panel(distance: np.ndarray, valid: np.ndarray) -> tuple[str, np.nd
     finite = distance[valid & np.isfinite(distance)]
     longest = float(finite.max(initial=0))
     colours = distance_colours(distance, longest or None, False)
-    caption = f"Distance to the edges, up to {longest:.3g}" if finite.size else "Distance: no edges"
+    caption = f"Distance to the edges, up to {longest:.3g} pixels" if finite.size else "Distance: no edges"
     return caption, np.where(valid[..., np.newaxis], colours, hatch(valid.shape))
-
-
-def _sheet(
-    panels: list[tuple[str, np.ndarray]], title: str | None, columns: int | None = None, *, key: bool = True
-) -> np.ndarray:
-    """Captioned panels in a grid near 16:9, a title above and the key to the colours below."""
-    height, width = panels[0][1].shape[:2]
-    width = max(width, *(_text_width(caption) for caption, _ in panels))
-    cells = [_cell(caption, picture, width) for caption, picture in panels]
-    height, width = cells[0].shape[:2]
-    columns = columns or min(
-        (1, 2, 4) if len(cells) == 4 else (1, 2, 3, 6),
-        key=lambda n: abs(np.log(n * width / (-(-len(cells) // n) * height) * 9 / 16)),
-    )
-    cells += [np.full_like(cells[0], _BACKGROUND)] * (-len(cells) % columns)
-    rows = [np.hstack(cells[i : i + columns]) for i in range(0, len(cells), columns)]
-    top = [] if title is None else [_bar(title, rows[0].shape[1])]
-    return np.vstack([*top, *rows, *([_key(rows[0].shape[1])] if key else [])])
-
-
-def _cell(caption: str, picture: np.ndarray, width: int) -> np.ndarray:
-    """A picture under its caption, with a margin to the right and below."""
-    cell = np.full((_BAR + picture.shape[0] + 4, width + 4, 3), _BACKGROUND, np.uint8)
-    cell[:_BAR] = _bar(caption, width + 4)
-    cell[_BAR : _BAR + picture.shape[0], : picture.shape[1]] = picture
-    return cell
-
-
-def _bar(text: str, width: int) -> np.ndarray:
-    bar = np.full((_BAR, width, 3), _BACKGROUND, np.uint8)
-    return cv2.putText(bar, _encodable(text), (6, _BAR - 9), _FONT, _FONT_SCALE, _INK, 1, cv2.LINE_AA)
-
-
-def _text_width(text: str) -> int:
-    return cv2.getTextSize(_encodable(text), _FONT, _FONT_SCALE, 1)[0][0] + 12
-
-
-def _encodable(text: str) -> str:
-    """A text without the lone surrogates that names of files may hold, which OpenCV 5 does not survive."""
-    return text.encode("utf-8", "replace").decode()
-
-
-def _sentence(text: str, width: int) -> list[np.ndarray]:
-    """Bars of text no wider than a picture."""
-    lines = [""]
-    for word in text.split():
-        longer = f"{lines[-1]} {word}".strip()
-        if lines[-1] and _text_width(longer) > width:
-            lines.append(word)
-        else:
-            lines[-1] = longer
-    return [_bar(line, width) for line in lines]
-
-
-def _key(width: int, entries: Sequence[tuple[tuple[int, int, int], str]] = EDGE_KINDS) -> np.ndarray:
-    """Colours with their meaning, by default those of edges, on as many lines as they need."""
-    lines, x = [_bar("", width)], 6
-    for colour, text in entries:
-        needed = _text_width(text) + 24
-        if x > 6 and x + needed > width:
-            lines.append(_bar("", width))
-            x = 6
-        cv2.rectangle(lines[-1], (x, 7), (x + 14, 21), colour, cv2.FILLED)
-        cv2.putText(lines[-1], text, (x + 22, _BAR - 9), _FONT, _FONT_SCALE, _INK, 1, cv2.LINE_AA)
-        x += needed
-    return np.vstack(lines)

@@ -11,8 +11,8 @@ KINDS = (  # later entries hide earlier ones
     (EDGE_BOUNDARY, (150, 150, 150), "beside no data"),
     (EDGE_CONCAVE, (233, 180, 86), "concave"),
     (EDGE_CONVEX, (66, 228, 240), "convex"),
-    (EDGE_JUMP, (0, 94, 213), "jump, near side"),
-    (EDGE_OCCLUDED, (167, 121, 204), "jump, far side"),
+    (EDGE_JUMP, (0, 94, 213), "jump, nearer side"),
+    (EDGE_OCCLUDED, (167, 121, 204), "jump, farther side"),
 )
 EDGE_KINDS = [*((colour, text) for _, colour, text in reversed(KINDS)), (PLAIN, "other")]
 LINE_KINDS = [  # of chains and segments, which have one line for both sides of a jump

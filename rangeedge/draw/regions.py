@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+import cv2
 import numpy as np
 
 from .. import _check
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 
     from .._typed import GeometryOptions
 
+_SIZE, _INK, _HALO = 0.45, (255, 255, 255), (0, 0, 0)  # of numbers
 REGION_COLOURS = np.array(  # Tol's muted scheme
     [
         (238, 204, 136), (119, 102, 204), (119, 204, 221), (51, 119, 17), (136, 34, 51),
@@ -82,6 +85,36 @@ def drawRegions(
         colours = _region_colours(labels, inside)
         canvas[inside] = np.rint(alpha * colours + (1 - alpha) * canvas[inside])
     return _check.deliver("dst", canvas, dst)
+
+
+def write_numbers(picture: np.ndarray, labels: np.ndarray) -> int:
+    """Write the label of every region where it is widest, if there is room; the result is for how many there is."""
+    count = 0
+    scale = picture.shape[1] / labels.shape[1]
+    for label, (row, col), room in _middles(labels):
+        text = str(label)
+        (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, _SIZE, 1)
+        if 2 * room * scale < max(width, height):
+            continue
+        count += 1
+        place = (int((col + 0.5) * scale - width / 2), int((row + 0.5) * scale + height / 2))
+        for colour, thickness in ((_HALO, 3), (_INK, 1)):
+            cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, _SIZE, colour, thickness, cv2.LINE_AA)
+    return count
+
+
+def _middles(labels: np.ndarray) -> Iterator[tuple[int, tuple[int, int], float]]:
+    """Of every region the label, the pixel farthest from its border, and how far that is."""
+    framed = np.pad(labels, 1)
+    inside = labels > 0
+    for row, col in ((0, 1), (2, 1), (1, 0), (1, 2)):
+        inside &= framed[row : row + labels.shape[0], col : col + labels.shape[1]] == labels
+    room = cv2.distanceTransform(np.pad(inside.view(np.uint8), 1), cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1] + 1
+    order = np.argsort(room, axis=None, kind="stable")
+    order = order[labels.flat[order] > 0]
+    names, last = np.unique(labels.flat[order[::-1]], return_index=True)
+    for label, place in zip(names.tolist(), order[::-1][last].tolist(), strict=True):
+        yield label, divmod(place, labels.shape[1]), float(room.flat[place])
 
 
 def _region_colours(labels: np.ndarray, inside: np.ndarray) -> np.ndarray:

@@ -17,7 +17,8 @@ from .._check import described, error
 from .._option import parsed
 from ..chains import link_frame
 from ..constants import SALIENCE_ADDITIVE
-from ..detector import createScanLineDetector, selected, thin_lines
+from ..detection import selected, thin_lines
+from ..detector import createScanLineDetector
 from ..distance import distanceTransform, salienceDistanceTransform
 from ..draw import colorizeDistance, drawChains, drawEdges, drawRegions
 from ..draw.relief import relief_of, subdued

@@ -18,7 +18,7 @@ from .ascii_grid import is_ascii_grid, read_ascii_grid
 from .atomic import write_atomically
 from .exr import read_exr, write_exr
 from .pcd import is_pcd, read_pcd, write_pcd
-from .pictures import read_pfm, read_pgm, read_png, write_pfm, write_pgm, write_png
+from .pictures import PNG_MAGIC, read_pfm, read_pgm, read_png, write_pfm, write_pgm, write_png
 from .ply import read_ply, write_ply
 from .points import writer_of_points
 from .range_image import RangeImage
@@ -253,7 +253,7 @@ def _is_ply(head: bytes) -> bool:
 
 
 _FORMATS = (
-    _Format("PNG", _begins(b"\x89PNG\r\n\x1a\n"), read_png),
+    _Format("PNG", _begins(PNG_MAGIC), read_png),
     _Format("TIFF", _begins(b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"), read_tiff),
     _Format("EXR", _begins(b"\x76\x2f\x31\x01"), read_exr),
     _Format("PGM", _is_netpbm(b"P2", b"P5"), read_pgm),

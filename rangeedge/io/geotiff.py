@@ -5,7 +5,6 @@ Tags: OGC 19-008r4, GeoTIFF 1.1, and ``GDAL_NODATA`` of the Geospatial Data Abst
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import numpy as np
@@ -58,12 +57,14 @@ def _without_data(image: np.ndarray, nodata: str) -> np.ndarray:
 def _scaled(image: np.ndarray, metadata: str) -> np.ndarray:
     """Values in their unit: those stored, times GDAL's scale, plus its offset; as floats where these change them."""
     values = {"scale": 1.0, "offset": 0.0}
-    for role in values:
-        for found in set(re.findall(rf'role="{role}"[^<>]*>([^<]*)<', metadata)):
-            try:
-                values[role] = float(found)
-            except ValueError:
-                raise ValueError(f"its {role} is {found[:40]!r}, no number") from None
+    for item in metadata.split("<")[:-1]:
+        attributes, _, found = item.partition(">")
+        for role in values:
+            if f'role="{role}"' in attributes:
+                try:
+                    values[role] = float(found)
+                except ValueError:
+                    raise ValueError(f"its {role} is {found[:40]!r}, no number") from None
     if values == {"scale": 1.0, "offset": 0.0}:
         return image
     if not all(np.isfinite(value) for value in values.values()) or values["scale"] == 0:
@@ -117,8 +118,7 @@ def _epsg(page: Page) -> int | None:
 
 def _geo_key(page: Page, key: int) -> int | None:
     """A short value of the directory of geo keys: entries of four words, the first of which is the header."""
-    words = page.values(tag.GEO_KEYS).astype(np.int64)
-    for entry in words[4 : len(words) // 4 * 4].reshape(-1, 4).tolist():
-        if entry[0] == key and entry[1] == 0:
-            return entry[3]
-    return None
+    words = page.values(tag.GEO_KEYS)
+    entries = words[4 : len(words) // 4 * 4].reshape(-1, 4)
+    found = np.flatnonzero((entries[:, 0] == key) & (entries[:, 1] == 0))
+    return int(entries[found[0], 3]) if len(found) else None

@@ -8,7 +8,6 @@ import json
 import os
 import tempfile
 from typing import Any
-from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 import cv2
@@ -16,6 +15,7 @@ import numpy as np
 
 from .._check import error, fail
 from .polylines import REGION, Line, grouped, no_pixels
+from .settings import xml_root
 
 _APP = "RANGEEDGE"  # whose extended data DXF entities carry
 _DXF_COLOURS = {"jump": 30, "convex": 2, "concave": 140, REGION: 7}  # of AutoCAD
@@ -86,10 +86,12 @@ def write_svg(lines: list[Line], picture: np.ndarray | None = None) -> bytes:
     text.append('<g fill="none" stroke-linejoin="round" stroke-linecap="round">')
     for group in grouped(lines):
         path = " ".join(_path(line) for line in group)
-        colour = _COLOURS.get(group[0].kind.split()[0], "#ffffff")
+        colour = _COLOURS.get(group[0].kind.partition(" ")[0], "#ffffff")
         fill = f' fill="{colour}" fill-opacity="0.15" fill-rule="evenodd"' if group[0].kind == REGION else ""
         known = quoteattr(json.dumps([line.properties for line in group]))
-        text.append(f'<path class="{group[0].kind}" stroke="{colour}"{fill} data-properties={known} d="{path}"/>')
+        text.append(
+            f'<path class={quoteattr(group[0].kind)} stroke="{colour}"{fill} data-properties={known} d="{path}"/>'
+        )
     return "\n".join([*text, "</g>", "</svg>", ""]).encode()
 
 
@@ -100,12 +102,12 @@ def _path(line: Line) -> str:
 
 def read_svg(data: bytes) -> list[Line]:
     lines = []
-    for path in ElementTree.fromstring(data).iter(f"{_SVG}path"):
+    for path in xml_root(data.decode()).iter(f"{_SVG}path"):
         known = json.loads(path.get("data-properties", "[]"))
         for i, part in enumerate(path.get("d", "").split("M ")[1:]):
             closed = part.rstrip().endswith("Z")
-            places = part.replace("Z", "").split(" L ")
-            pixels = np.array([place.strip().split(",") for place in places], np.float64).reshape(-1, 2)
+            places = part.replace("Z", "").replace("L", " ").split()
+            pixels = np.array([place.split(",") for place in places], np.float64).reshape(-1, 2)
             own = known[i] if i < len(known) else {}
             lines.append(Line(path.get("class", ""), closed, pixels, np.full((len(pixels), 3), np.nan), own))
     return lines

@@ -114,7 +114,7 @@ def write_obj(lines: list[Line]) -> bytes:
     for i, line in enumerate(lines):
         text.append(f"o {line.kind.replace(' ', '_')}_{i}")
         text += [f"v {x!r} {y!r} {z!r}" for x, y, z in line.points.tolist()]
-        index = [*range(first, first + len(line.points)), *([first] if line.closed else [])]
+        index = [*range(first, first + len(line.points)), *([first] if line.closed and len(line.points) else [])]
         text.append("l " + " ".join(map(str, index)))
         first += len(line.points)
     return "".join(f"{row}\n" for row in text).encode()

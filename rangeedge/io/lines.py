@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import Any, NamedTuple
 
 import cv2
@@ -14,7 +14,7 @@ import numpy as np
 from .._check import array, described, error, fail, public
 from .atomic import write_atomically
 from .polylines import Line, toLines
-from .source import file_name
+from .source import file_name, opened
 
 
 class _Format(NamedTuple):
@@ -120,7 +120,7 @@ def readLines(filename: str | os.PathLike[str]) -> list[Line]:
 
     Formats hold different things: all have kinds and, but for SVG, points; CSV, PLY and SVG pixels; CSV and GeoJSON all
     properties, SVG and DXF too, PLY the angle alone. GeoJSON with a transform has map coordinates for x and y. In a
-    PLY file lines of a single point are lost.
+    PLY file lines of a single point are lost, in PLY and CSV those without points.
 
     Parameters
     ----------
@@ -150,14 +150,14 @@ def readLines(filename: str | os.PathLike[str]) -> list[Line]:
     """
     name = file_name(filename, "filename")
     suffix = _suffix(name, "read")
-    try:
-        return _FORMATS[suffix].function("read", suffix)(Path(name).read_bytes())
-    except OSError as reason:
-        raise error(f"cannot read {name!r}: {reason.strerror or reason}", cv2.Error.StsError) from reason
-    except (ValueError, KeyError, IndexError, TypeError, SyntaxError) as reason:
-        if isinstance(reason, error):
-            raise
-        raise error(f"cannot read {name!r}: it holds no lines ({reason})", cv2.Error.StsError) from reason
+    with opened(name) as (stream, size):
+        data = stream.read(size)
+        try:
+            return toLines(_FORMATS[suffix].function("read", suffix)(data))
+        except Exception as reason:  # readers of text raise what comes of the words they meet
+            if isinstance(reason, error) and isinstance(reason.__context__, ImportError):
+                raise
+            raise ValueError(f"it holds no lines ({getattr(reason, 'err', reason)})") from reason
 
 
 def encoded_lines(suffix: str, lines: Any, **options: Any) -> bytes:
@@ -171,7 +171,13 @@ def encoded_lines(suffix: str, lines: Any, **options: Any) -> bytes:
         if picture.dtype != np.uint8 or picture.shape[2] != 3:
             raise fail("picture", "a CV_8UC3 picture", described(picture))
     own = _FORMATS[suffix]
-    return own.function("write", suffix)(toLines(lines), **{name: options.get(name) for name in own.takes})
+    lines = toLines(lines)
+    try:
+        return own.function("write", suffix)(lines, **{name: options.get(name) for name in own.takes})
+    except (ArithmeticError, ValueError) as reason:  # of values that are infinite or not in every format
+        if isinstance(reason, error):
+            raise
+        raise fail("lines", f"what {suffix} can hold", f"lines of which it cannot ({reason})") from reason
 
 
 def is_line_file(path: str | os.PathLike[str]) -> bool:

@@ -13,6 +13,7 @@ from .. import _core
 from .source import HEADER_LIMIT, expect_at_least, expect_pixels, expect_unpacked, inflate
 from .text import numbers
 
+PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 _PNG_COLOURS = {0: "grey values", 2: "colours", 3: "a palette", 4: "opacity", 6: "colours"}  # by colour type
 
 

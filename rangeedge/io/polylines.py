@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._check import described, fail, public
+from .._check import boolean, described, fail, public
 from ..arcs import ARC, arc_points
 from ..boundaries import RegionBoundaries
 from ..chains import EdgeChain
@@ -15,6 +17,7 @@ from ..edges import kindNames
 from ..segments import SEGMENT, Segments
 
 REGION = "region"  # the kind of an outline
+_ANGLES = ("crease", "dihedral", "angle")
 
 
 class Line(NamedTuple):
@@ -32,8 +35,9 @@ class Line(NamedTuple):
         The same in space.
     properties : dict
         Numbers, booleans, and lists of them: of a chain jump, crease, significance and length; of a segment jump,
-        dihedral, length, rms, endDeviation, directionDeviation and vertices; of an arc center, normal, radius, angle
-        and more that `fitArcs` tells, while its pixels are not known; of a ring label, region, hole and area.
+        dihedral, length, rms, endDeviation, directionDeviation, lengthDeviation and vertices; of an arc center, normal,
+        radius, angle and more that `fitArcs` tells, while its pixels are not known; of a ring label, region, hole and
+        area.
     """
 
     kind: str
@@ -45,8 +49,7 @@ class Line(NamedTuple):
     @property
     def angle(self) -> float:
         """The crease or the dihedral angle in degrees, NaN of what has none."""
-        names = ("crease", "dihedral", "angle")
-        return float(next((self.properties[name] for name in names if name in self.properties), np.nan))
+        return float(next((self.properties[name] for name in _ANGLES if name in self.properties), np.nan))
 
 
 @public
@@ -69,7 +72,7 @@ def toLines(lines: Any) -> list[Line]:
     Raises
     ------
     rangeedge.error
-        If `lines` is nothing of that.
+        If `lines` is nothing of that, or a Line does not hold what it should.
 
     Examples
     --------
@@ -91,10 +94,33 @@ def toLines(lines: Any) -> list[Line]:
     if isinstance(lines, Sequence) and all(isinstance(line, EdgeChain) for line in lines):
         return list(_of_chains(lines))
     if isinstance(lines, Sequence) and all(isinstance(line, Line) for line in lines):
-        return list(lines)
+        return [_checked(line) for line in lines]
     raise fail(
         "lines", "EdgeChains, Segments, arcs, RegionBoundaries, or a sequence of EdgeChain or Line", described(lines)
     )
+
+
+_KIND = re.compile(r"[\w.-]+( [\w.-]+)*")  # words, so that every format can hold it
+
+
+def _checked(line: Line) -> Line:
+    """The same line; what it holds is what its formats can hold."""
+    if not isinstance(line.kind, str) or not _KIND.fullmatch(line.kind):
+        raise fail("lines", "lines of a kind in words", described(line.kind))
+    boolean("closed", line.closed)
+    for name, places, width in (("pixels", line.pixels, 2), ("points", line.points, 3)):
+        shape = (len(line.points) if isinstance(line.points, np.ndarray) else "N", width)
+        if not isinstance(places, np.ndarray) or places.dtype.kind != "f" or places.shape != shape:
+            raise fail("lines", f"lines with {name} as a float array of shape {shape}", described(places))
+    known = line.properties
+    try:
+        plain = isinstance(known, Mapping) and all(isinstance(name, str) for name in known)
+        json.dumps(known)
+    except (TypeError, ValueError, RecursionError):
+        plain = False
+    if not (plain and all(isinstance(known.get(name, 0.0), (int, float)) for name in _ANGLES)):
+        raise fail("lines", "lines whose properties are numbers, booleans and lists of them", described(known))
+    return line
 
 
 def _of_chains(chains: Sequence[EdgeChain]) -> Iterator[Line]:
@@ -107,7 +133,7 @@ def _of_chains(chains: Sequence[EdgeChain]) -> Iterator[Line]:
 
 def _of_segments(segments: np.ndarray) -> Iterator[Line]:
     for segment in segments:
-        names = ("jump", "dihedral", "length", "rms", "endDeviation", "directionDeviation")
+        names = ("jump", "dihedral", "length", "rms", "endDeviation", "directionDeviation", "lengthDeviation")
         known: dict[str, Any] = {name: float(segment[name]) for name in names}
         known["vertices"] = segment["vertices"].tolist()
         yield Line(kindNames(int(segment["kind"])), False, segment["pixels"].copy(), segment["ends"].copy(), known)

@@ -1,4 +1,4 @@
-"""Settings in YAML, JSON or XML as nested dicts and lists, as far as camera files need them.
+"""Settings in YAML, JSON or XML as nested dicts and lists, as far as files of cameras and parameters need them.
 
 Of YAML it reads what calibration tools write: maps by indentation, lists in brackets or by dashes, plain and quoted
 scalars, comments; a tag such as ``!!opencv-matrix`` is passed over. Anchors, block texts and the rest are refused.
@@ -12,34 +12,39 @@ import xml.etree.ElementTree as ElementTree
 from typing import Any
 
 _DEPTH = 32  # levels of nesting
+# What is no number, as cv2.FileStorage writes it and as JSON does.
+_OF_JSON = {".Inf": "Infinity", "-.Inf": "-Infinity", ".Nan": "NaN", "-.Nan": "NaN"}
+_STORED = re.compile(r"(?<=[\s\[:,])-?\.(?:Inf|Nan)\b")
 
 
 def parse(text: str) -> Any:
     """Nested dicts and lists of strings, numbers, booleans and None."""
     start = text.lstrip("\ufeff \t\r\n")
     if start.startswith("<"):
-        return _from_xml(start)
+        return _of_element(xml_root(start))
     if start.startswith(("{", "[")):
         try:
-            return json.loads(start)
+            return json.loads(_STORED.sub(lambda found: _OF_JSON[found[0]], start))
         except json.JSONDecodeError as reason:
             raise ValueError(f"its JSON is garbled: {reason}") from None
     return _Yaml(text).document()
 
 
-def _from_xml(text: str) -> Any:
+def xml_root(text: str) -> ElementTree.Element:
+    """The outermost element. Entities, which could multiply without end, are refused."""
     if "<!ENTITY" in text or "<!DOCTYPE" in text:
         raise ValueError("it is XML with entities")
     try:
-        root = ElementTree.fromstring(text)
+        return ElementTree.fromstring(text)
     except ElementTree.ParseError as reason:
         raise ValueError(f"its XML is garbled: {reason}") from None
-    return _of_element(root)
 
 
 def _of_element(element: ElementTree.Element, depth: int = 0) -> Any:
     if depth > _DEPTH:
         raise ValueError(f"it is nested more than {_DEPTH} levels")
+    if len(element) and all(child.tag == "_" for child in element):  # a list of lists of cv2.FileStorage
+        return [_of_element(child, depth + 1) for child in element]
     if len(element):
         return {child.tag: _of_element(child, depth + 1) for child in element}
     words = (element.text or "").split()
@@ -173,7 +178,7 @@ def _brackets(text: str) -> int:
 class _Flow:
     """A value in brackets or braces."""
 
-    _TOKEN = re.compile(r"""\s*([\[\]{},:]|"[^"]*"|'[^']*'|[^\s\[\]{},:"'][^\[\]{},:]*)""")
+    _TOKEN = re.compile(r"""([\[\]{},:]|"[^"]*"|'[^']*'|[^\s\[\]{},:"'][^\[\]{},:]*)""")
 
     def __init__(self, text: str) -> None:
         self.tokens = [token.strip() for token in self._TOKEN.findall(text)]

@@ -23,6 +23,7 @@ from .tiff_tags import Page
 _UNCOMPRESSED = 1
 _RGB = 2
 _COLOURS = {_RGB: "RGB", 3: "a palette", 5: "CMYK", 6: "YCbCr", 8: "CIELab"}
+_SHARED = 2**24  # bytes that strips and tiles may have beyond those of the file, which some of them share
 Shape = tuple[int, int, int]  # rows, columns, samples
 Window = tuple[int, int, int, int]  # first row and column, and those behind the last
 
@@ -101,7 +102,7 @@ def _expect_no_colours(page: Page) -> None:
     """
     photometric = page.value(tag.PHOTOMETRIC, 1)
     by_tifffile = page.text(tag.SOFTWARE).startswith("tifffile") if tag.SOFTWARE in page else False
-    floats = set(page.values(tag.SAMPLE_FORMAT, (1,)).tolist()) == {3}
+    floats = _all_of(page, tag.SAMPLE_FORMAT) == [3]
     if photometric in _COLOURS and not (photometric == _RGB and by_tifffile and floats):
         raise _colours(_COLOURS[photometric])
 
@@ -109,10 +110,9 @@ def _expect_no_colours(page: Page) -> None:
 def _sample_type(page: Page) -> tuple[np.dtype, int]:
     """The type of a sample, and how many there are a pixel."""
     samples = page.value(tag.SAMPLES_PER_PIXEL, 1)
-    bits = set(page.values(tag.BITS_PER_SAMPLE, (1,)).tolist())
-    kinds = set(page.values(tag.SAMPLE_FORMAT, (1,)).tolist())
-    if len(bits) != 1 or len(kinds) != 1 or not kinds <= _KINDS.keys():
-        raise ValueError(f"it holds samples of {sorted(bits)} bits of the formats {sorted(kinds)}")
+    bits, kinds = _all_of(page, tag.BITS_PER_SAMPLE), _all_of(page, tag.SAMPLE_FORMAT)
+    if len(bits) != 1 or len(kinds) != 1 or kinds[0] not in _KINDS:
+        raise ValueError(f"it holds samples of {bits[:9]} bits of the formats {kinds[:9]}")
     (width,), (kind,) = bits, kinds
     if width <= 8:
         raise ValueError(f"it holds {width} bits (8 bits are too coarse for edges); a range image has 16 or more")
@@ -121,6 +121,11 @@ def _sample_type(page: Page) -> tuple[np.dtype, int]:
     if samples not in (1, 3, 4):
         raise ValueError(f"it holds {samples} channels; a range image has one, or the three of x, y and z")
     return np.dtype(f"{page.order}{_KINDS[kind]}{width // 8}"), samples
+
+
+def _all_of(page: Page, code: int) -> list[int]:
+    """The different values of a tag, 1 where there is none."""
+    return np.unique(page.values(code, (1,))).tolist()
 
 
 def _from_segments(
@@ -142,6 +147,8 @@ def _from_segments(
     down, right = -(-rows // height), -(-cols // width)
     if len(offsets) != planes * down * right or len(counts) != len(offsets):
         raise ValueError(f"it has {len(offsets)} strips or tiles where {planes * down * right} are needed")
+    if counts.min() < 0 or counts.sum(dtype=np.float64) > len(page.data) + _SHARED:
+        raise ValueError("its strips or tiles overlap")
 
     decode = _DECODERS[page.value(tag.COMPRESSION, _UNCOMPRESSED)]
     predictor = page.value(tag.PREDICTOR, 1) if decode is not _stored else 1

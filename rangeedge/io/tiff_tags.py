@@ -50,21 +50,26 @@ class Page:
     def __init__(self, data: bytes, order: str, entries: np.ndarray, first_entry: int) -> None:
         self.data, self.order, self._first = data, order, first_entry
         self._entries = entries
-        self._index = {int(code): i for i, code in enumerate(entries["code"])}
+
+    def _place(self, code: int) -> int | None:
+        """Which entry is that of a tag; the last one, if there are several."""
+        found = np.flatnonzero(self._entries["code"] == code)
+        return int(found[-1]) if len(found) else None
 
     def __contains__(self, code: int) -> bool:
-        return code in self._index
+        return self._place(code) is not None
 
     def values(self, code: int, default: tuple[int, ...] = ()) -> np.ndarray:
         """All values of a tag."""
-        if code not in self._index:
+        place = self._place(code)
+        if place is None:
             return np.array(default, dtype=np.int64)
-        entry = self._entries[self._index[code]]
+        entry = self._entries[place]
         kind, count = int(entry["kind"]), int(entry["count"])
         if kind not in _TYPES:
             raise ValueError(f"its tag {code} has the unknown type {kind}")
         dtype = np.dtype(self.order + _TYPES[kind])
-        start = self._first + self._index[code] * self._entries.dtype.itemsize
+        start = self._first + place * self._entries.dtype.itemsize
         start += self._entries.dtype.fields["value"][1]  # type: ignore[index]
         if count * dtype.itemsize > self._entries.dtype["value"].itemsize:
             start = int(entry["value"])
@@ -96,6 +101,7 @@ def pages(data: bytes, limit: int = PAGES) -> Iterator[Page]:
 
     at = integer(offset, 8 if big else 4)
     seen: set[int] = set()
+    read = 0  # bytes of the entries of all pages
     while at and len(seen) < limit:
         if at in seen:
             raise ValueError("its pages form a circle")
@@ -104,6 +110,9 @@ def pages(data: bytes, limit: int = PAGES) -> Iterator[Page]:
         first = at + np.dtype(count).itemsize
         end = first + entries * layout.itemsize
         expect_at_least(len(data), end)
+        read += end - at
+        if read > len(data):
+            raise ValueError("its pages overlap")
         yield Page(data, order, np.frombuffer(data, layout, entries, first), first)
         # Some writers leave out what would point to nothing.
         at = integer(offset, end) if end + np.dtype(offset).itemsize <= len(data) else 0

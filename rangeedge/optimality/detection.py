@@ -46,7 +46,7 @@ def measureDetector(
     Returns
     -------
     (n,) float64 array
-        In degrees; NaN where less than half of the line was detected.
+        In degrees; NaN where less than half of the line was detected, and of equal normals.
 
     Raises
     ------
@@ -68,7 +68,8 @@ def measureDetector(
         depth += rng.normal(0, sigma, depth.shape)
         # Without noise what is left is the rounding of single precision.
         strength = edgeStrength(depth, pixelSize=1.0, noise=max(sigma, 1e-4), crease=crease).crease
-        found = _strength_along(strength, _edge_direction(normal1, normal2), centre)
+        direction = _edge_direction(normal1, normal2)
+        found = _strength_along(strength, direction, centre) if np.isfinite(direction).all() else 0.0
         errors[k] = found - angle_between(normal1, normal2) if found > 0 else np.nan
     return errors
 
@@ -81,7 +82,7 @@ def _plane_pair(normal1: np.ndarray, normal2: np.ndarray, centre: np.ndarray, si
 
 
 def _edge_direction(normal1: np.ndarray, normal2: np.ndarray) -> np.ndarray:
-    """Unit direction (x, y) of the image of the line in which two planes meet."""
+    """Unit direction (x, y) of the image of the line in which two planes meet; NaN of planes that are parallel."""
     difference = normal1[:2] / normal1[2] - normal2[:2] / normal2[2]
     return np.array([-difference[1], difference[0]]) / np.linalg.norm(difference)
 

@@ -147,6 +147,6 @@ class ErrorSums:
         if not self._count:
             return ErrorStatistics(0, *[float("nan")] * 5)
         mean = self._absolute / self._count
-        deviation = max(self._square / self._count - mean**2, 0) ** 0.5
+        deviation = max(self._square / self._count - mean * mean, 0) ** 0.5
         bias, over = self._signed / self._count, self._over / self._count
         return ErrorStatistics(self._count, mean, deviation, bias, self._largest, over)

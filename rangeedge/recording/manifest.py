@@ -31,7 +31,7 @@ def read_lines(path: Path) -> dict[str, Line]:
     except FileNotFoundError:
         return found
     for line in text.splitlines():
-        with contextlib.suppress(ValueError, KeyError, TypeError):
+        with contextlib.suppress(ValueError, KeyError, TypeError, RecursionError):
             entry = json.loads(line)
             found[entry["frame"]] = entry
     return found

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from typing import Any
 
-import cv2
 import numpy as np
 
 from ..io import RangeImage
+from ..io.pictures import PNG_MAGIC, read_png
 from ..io.source import expect_at_least, expect_pixels
 
 _DEPTHS = {"16UC1": "u2", "mono16": "u2", "32FC1": "f4", "64FC1": "f8"}
 _FLOATS = {7: "f4", 8: "f8"}  # of the fields of a cloud
+_LONGEST = 11  # digits of a number of RVL, which has 32 bits
 _HEADER = 12  # bytes before the picture of compressedDepth: format, and the two numbers of quantization
 
 IMAGE = "sensor_msgs/msg/Image"
@@ -65,9 +66,12 @@ def depth_of_compressed(message: Any) -> np.ndarray:
     expect_at_least(len(content), _HEADER + 8)
     a, b = np.frombuffer(message.data, "<f4", 2, 4).tolist()
     packed = content[_HEADER:]
-    stored = _unpacked_rvl(packed) if transport.endswith("rvl") else cv2.imdecode(packed, cv2.IMREAD_UNCHANGED)
-    if stored is None or stored.dtype != np.uint16 or stored.ndim != 2:
-        raise ValueError("its picture is garbled, or no PNG of one channel of 16 bits")
+    if transport.endswith("rvl"):
+        stored = _unpacked_rvl(packed)
+    elif packed[:8].tobytes() == PNG_MAGIC:
+        stored = read_png(packed.tobytes()).astype(np.uint16)
+    else:
+        raise ValueError("its picture is garbled, or no PNG")
     if encoding == "16UC1":
         return stored
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -89,8 +93,10 @@ def _unpacked_rvl(packed: np.ndarray) -> np.ndarray:
     last = np.flatnonzero(digits < 8)
     expect_at_least(len(last), 2, "numbers")
     first = np.concatenate([[0], last[:-1] + 1])
+    if (last - first >= _LONGEST).any():
+        raise ValueError("its numbers are garbled")
     place = np.arange(last[-1] + 1) - np.repeat(first, last - first + 1)
-    values = (digits[: last[-1] + 1].astype(np.int64) & 7) << (3 * np.minimum(place, 20))
+    values = (digits[: last[-1] + 1].astype(np.int64) & 7) << (3 * place)
     numbers = np.add.reduceat(values, first)
     depth = np.zeros(rows * cols, np.uint16)
     at = pixel = 0
@@ -104,6 +110,8 @@ def _unpacked_rvl(packed: np.ndarray) -> np.ndarray:
             raise ValueError("its runs are longer than the picture")
         steps = numbers[at : at + count]
         values = previous + np.cumsum((steps >> 1) ^ -(steps & 1))
+        if count and not 0 <= values.min() <= values.max() < 2**16:
+            raise ValueError("its depths have more than 16 bits")
         depth[pixel : pixel + count] = values
         previous = values[-1] if count else previous
         pixel, at = pixel + count, at + count

@@ -14,14 +14,14 @@ import numpy as np
 from ..io import RangeImage
 from ..io.arrays import source_name
 from ..io.files import as_range_image
-from ..io.source import opened
+from ..io.source import expect_pixels, opened
 from ..io.tiff import images_of_tiff, read_page
 from ..io.tiff_tags import Page
 from .archives import npz_stack
 from .source import FrameSource, extra, failures_named, kept
 
 _TIFF_HEADS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_PAGES = 2**20
+_MOST = 2**20  # frames of a file
 _GEOMETRY = ("K", "distCoeffs", "pixelSize", "heightMap", "depthFactor")
 
 
@@ -64,6 +64,8 @@ def stack_frames(path: str) -> list[FrameSource]:
 
 def _frames(shape: tuple[int, ...], dtype: np.dtype) -> int:
     """How many frames an array of this shape holds; 0 where it is one range image."""
+    if len(shape) in (3, 4) and shape[0] > _MOST:
+        raise ValueError(f"it holds {shape[0]} frames, more than the {_MOST} that are listed of a file")
     if len(shape) == 4 or (len(shape) == 3 and not (dtype.kind == "f" and shape[2] in (1, 3, 4))):
         return shape[0]
     return 0
@@ -93,7 +95,7 @@ def _npz_frame(path: str, index: int) -> RangeImage:
 @kept(4)
 def _pages(path: str) -> list[Page]:
     with opened(path, math.inf) as (stream, _):
-        return images_of_tiff(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ), _PAGES)  # type: ignore[arg-type]
+        return images_of_tiff(mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ), _MOST)  # type: ignore[arg-type]
 
 
 def _tiff_frame(path: str, index: int) -> RangeImage:
@@ -119,4 +121,7 @@ def zarr_array(path: str) -> tuple[Any, Mapping[str, Any]]:
 
 
 def _zarr_frame(path: str, index: int) -> RangeImage:
-    return RangeImage(np.asarray(zarr_array(path)[0][index]))
+    array, _ = zarr_array(path)
+    expect_pixels(*array.shape[1:3])
+    expect_pixels(1, math.prod(array.chunks))  # which are unpacked as a whole
+    return RangeImage(np.asarray(array[index]))

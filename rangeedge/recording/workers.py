@@ -22,10 +22,12 @@ from typing import Any, NamedTuple
 import cv2
 
 from .. import _core
+from .._check import error
 
 _PATIENCE = 0.05  # seconds between questions whether the wait is given up
 _AHEAD = 3  # tasks a worker that are in flight: one at work, one waiting, one whose result waits for those before
 _MOST_ON_WINDOWS = 61  # processes that can be waited for together
+_UNGUARDED = 73  # exit code of a worker that was about to run the whole program again
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 
 
@@ -59,6 +61,12 @@ def _is_full(problem: BaseException | None) -> bool:
     return False
 
 
+def expect_guard(jobs: int) -> None:
+    """Of a worker that runs the program itself as it begins: end, and leave it to its parent to say why."""
+    if jobs > 1 and getattr(multiprocessing.current_process(), "_inheriting", False):
+        os._exit(_UNGUARDED)
+
+
 def run_here(call: Callable[[Any], Any], tasks: Iterable[Any]) -> Iterator[Outcome]:
     """One task after the other, in this process."""
     return (attempt(call, task) for task in tasks)
@@ -68,18 +76,24 @@ def run_local(call: Callable[[Any], Any], tasks: Iterable[Any], jobs: int) -> It
     """That many tasks at a time, each in a process of its own; outcomes in the order of the tasks."""
     pool = _pool(jobs)
     waiting: deque[tuple[Any, Future[Outcome]]] = deque()
-    tasks = iter(tasks)
+    tasks, workers = iter(tasks), {}
     try:
         while True:
             while len(waiting) < _AHEAD * jobs and (task := next(tasks, waiting)) is not waiting:
                 waiting.append((task, _submitted(pool, call, task)))
+                workers.update(pool._processes or {})
             if not waiting:
                 return
             task, future = waiting.popleft()
             try:
                 outcome = _awaited(future)
             except BrokenProcessPool:
-                pool.shutdown(wait=False, cancel_futures=True)
+                pool.shutdown(cancel_futures=True)
+                if any(worker.exitcode == _UNGUARDED for worker in workers.values()):
+                    raise error(
+                        f"`jobs` = {jobs} starts processes that run the program up to here themselves: put what it does"
+                        " under if __name__ == '__main__':"
+                    ) from None
                 suspects = [(task, future), *waiting]
                 waiting.clear()
                 yield from (_alone(call, *suspect) for suspect in suspects)

@@ -112,7 +112,7 @@ def orthographicCamera(pixelSize: tuple[float, float], size: tuple[int, int], di
     if (pitch <= 0).any():
         raise _check.fail("pixelSize", "two numbers > 0", _check.described(pixelSize))
     distance = 2 * size[0] * pitch[0] if distance is None else distance
-    distance = _check.number("distance", float(distance), 0, above=True)
+    distance = _check.number("distance", distance, 0, above=True)
 
     def rays(x: np.ndarray, y: np.ndarray) -> Rays:
         zero = np.zeros_like(x)

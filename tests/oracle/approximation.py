@@ -101,7 +101,8 @@ def _split_run(y, x, eps, scale, first, last):
 def _cut_at(y, first, last, k):
     """The last sample before the cut beside an extreme sample."""
     left, right = abs(y[k] - y[k - 1]), abs(y[k + 1] - y[k])
-    return k if left < right or (left == right and k < (first + last) / 2) else k - 1
+    rounding = 4 * np.finfo(y.dtype).eps * abs(y[k])
+    return k if left < right - rounding or (left <= right + rounding and k < (first + last) / 2) else k - 1
 
 
 def midpoint(y, x, first, last):

@@ -107,7 +107,7 @@ class Detector:
         falling = [k for k, p in zip(samples, share, strict=True) if p < 1 - OWN_SHARE]
         a = max([left.last] + [k for k in samples if not rising or k < rising[0]])
         b = min([right.first] + [k for k in samples if not falling or k > falling[-1]])
-        smeared = [k for k in range(a + 1, b) if not math.isnan(line.y[k])]
+        smeared = [k for k in range(a + 1, b) if not math.isnan(line.y[k]) and line.seen[k]]
         steepest = max(np.diff([0.0, *share, 1.0]))
         if len(smeared) > self.p.maxSmear or steepest > MOST_EVEN / (len(smeared) + 1):
             return None
@@ -169,7 +169,8 @@ class Detector:
         x = meeting(left.curve, right.curve, middle) if self.p.maxShift > 0 else None
         if x is None:
             return stay
-        if xa <= x <= xb:
+        rounding = 1e-9 * (xb - xa)
+        if xa - rounding <= x <= xb + rounding:
             sample = a + (b - a) * (x - xa) / (xb - xa)
             return (a, b, x, sample, True) if abs(sample - (a + b) / 2) <= self.p.maxShift else stay
         # The first sample passed over, and the curve to which it would belong.
@@ -178,7 +179,7 @@ class Detector:
             here, there = float(line.x[k]), float(line.x[k + step])
             if abs(float(line.y[k]) - curve.value(here)) > line.tolerance[k]:
                 return stay
-            if min(here, there) <= x <= max(here, there):
+            if min(here, there) - rounding <= x <= max(here, there) + rounding:
                 sample = k + step * (x - here) / (there - here)
                 if abs(sample - (a + b) / 2) > self.p.maxShift:
                     return stay
@@ -246,9 +247,10 @@ def _extended(curve, x, to):
 
 
 def _at(line, before, after, sample):
-    """Where a candidate is: its position, and the pixels on either side."""
+    """Where a candidate is: its position, and the pixels with data on either side."""
     (u, v), (dx, dy) = line.pixels[0], STEPS[line.direction]
-    return dict(x=u + sample * dx, y=v + sample * dy, pixels=(line.pixels[before], line.pixels[after]))
+    a, b = max(np.flatnonzero(line.seen[: before + 1])), after + min(np.flatnonzero(line.seen[after:]))
+    return dict(x=u + sample * dx, y=v + sample * dy, pixels=(line.pixels[a], line.pixels[b]))
 
 
 def _range_around(line, before, after):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from rangeedge import DIR_COLS, DIR_DIAG45, DIR_DIAG135, DIR_ROWS, NoiseModel, S
 from .curves import FitNoise, fitted, least_squares, noise_along, wave_share
 
 SMALLEST = 1e-30  # deviation of the noise
+BRIDGED = 2  # samples of a hole across which lines may run on
 PARALLEL = 1e-14  # what rounding makes of parallel tangents here
 
 STEPS = {DIR_ROWS: (1, 0), DIR_COLS: (0, 1), DIR_DIAG45: (1, -1), DIR_DIAG135: (1, 1)}  # (dx, dy)
@@ -32,6 +34,7 @@ class Line:
     noise: FitNoise
     tolerance: np.ndarray
     scale: np.ndarray | None  # inverse tolerances, where they differ
+    seen: np.ndarray  # whether a sample is of the image, not across a small hole
     place: Any = None  # abscissa to the position (X, Y) in the plane of the image
 
     def deviation(self, samples, n):
@@ -94,6 +97,30 @@ class Line:
         return float(np.linalg.norm(np.cross(t, change)) / (t @ t))
 
 
+def bridged(x, y, tolerance, widest):
+    """The holes [first, end) of one or two samples, across which a line runs on as it does beside them."""
+    x, y = np.float64(x), np.float64(y)
+    slopes = np.full(len(y) + 1, np.nan)  # before every sample, and after the last
+    with np.errstate(all="ignore"):
+        slopes[1:-1] = np.diff(y) / np.diff(x)
+    slopes[~np.isfinite(slopes)] = 0
+    valid = np.flatnonzero(~np.isnan(y))
+    for a, b in pairwise(valid):
+        if not (0 < b - a - 1 <= min(BRIDGED, widest) and x[b] > x[a]):
+            continue
+        rises = [0.0, slopes[a] * (x[b] - x[a]), slopes[b + 1] * (x[b] - x[a])]
+        slack = 2 * max(tolerance[a], tolerance[b])
+        if min(rises) - slack <= y[b] - y[a] <= max(rises) + slack:
+            yield a + 1, b
+
+
+def interpolate(values, first, end):
+    """Puts straight lines across a hole."""
+    dtype, n = values.dtype.type, end - first + 1
+    for i in range(1, n):
+        values[first + i - 1] = (dtype(n - i) * values[first - 1] + dtype(i) * values[end]) / dtype(n)
+
+
 def middles(first, last):
     """The two samples in the middle, or twice the one where their number is odd."""
     return [(first + last) // 2, (first + last + 1) // 2]
@@ -152,14 +179,18 @@ class Image:
             x, y, place = self._points(pixels)
         else:
             x, y, place = self._grid(pixels)
-        ordinate = np.asarray(y, np.float64)
         noise, waves = noise_along(direction, self.noise), self.noise.of_fits()[:4]
         factor = self.params.epsFactor * noise.residual
         c = [factor * w for w in waves] if self.params.eps is None else [self.params.eps, 0.0, 0.0, 0.0]
         # The same everywhere: a length on a grid, or one that grows with the square of the depth.
         even = c[1] == c[3] == (c[0] if self.projective else c[2]) == 0
         scale = None if even else 1 / self._of_ordinate(c, y)
-        tolerance = np.full(len(y), max(c[2 if self.projective else 0], SMALLEST)) if even else 1 / np.float64(scale)
+        largest = np.full(len(y), max(c[2 if self.projective else 0], SMALLEST))
+        seen = np.array([self.has_data(u, v) for u, v in pixels])
+        for first, end in list(bridged(x, y, largest if even else 1 / np.float64(scale), self.params.maxGap)):
+            for values in (x, y) if even else (x, y, scale):
+                interpolate(values, first, end)
+        ordinate = np.asarray(y, np.float64)
         return Line(
             pixels,
             direction,
@@ -169,8 +200,9 @@ class Image:
             sigma=self._of_ordinate((self.noise.a, self.noise.b, self.noise.c, 0.0), ordinate),
             waves=self._of_ordinate(waves, ordinate),
             noise=noise,
-            tolerance=tolerance,
+            tolerance=largest if even else 1 / np.float64(scale),
             scale=scale,
+            seen=seen,
             place=place,
         )
 

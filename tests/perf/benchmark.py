@@ -3,7 +3,7 @@
 - frames: every stage on full frames, with one thread and two, beside what OpenCV has for the same ends. All calls on a
   frame take turns in one process, so that a busy machine slows them alike; compare ratios.
 - growth: nanoseconds and bytes per pixel, from small images to large ones.
-- worst: the worst images of every stage beside a typical one.
+- worst: the worst images of every function beside a typical one (worst.py has more to choose from).
 
 Frames are generated, and real ones come on top where the data are installed: `RANGEEDGE_SHARED` may name their folder.
 All together takes less than five minutes on two quiet cores.
@@ -19,7 +19,7 @@ import numpy as np
 from frames import Frame, frames
 from growth import growth
 from stages import CANNY, CHAIN, COPY, PRECISE, READING, Times, candidates, others, stages
-from worst import worst
+from worst import size_of, worst
 
 import rangeedge
 
@@ -73,7 +73,7 @@ def main() -> None:
     if "growth" in sections:
         growth()
     if "worst" in sections:
-        worst(*map(int, args.worst_size.split("x")), args.stages.split(","))
+        worst([size_of(args.worst_size)], args.stages.split(","))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ constexpr double least_crossing = 0.3;  // sine of the angle between a scan line
 template <class T>
 class Cutter {
 public:
-    Cutter(Piece& chain, const Frame<T>& frame, const std::vector<Candidate>& candidates, const Crossings& crossings,
+    Cutter(Piece& chain, const Frame<T>& frame, const CandidateList& candidates, const Crossings& crossings,
            double least_angle)
         : chain_(chain), frame_(frame), candidates_(candidates), crossings_(crossings), least_angle_(least_angle) {
         for (std::ptrdiff_t i = 0; i < chain.members.size(); ++i) {
@@ -181,7 +181,7 @@ private:
 
     Piece& chain_;
     const Frame<T>& frame_;
-    const std::vector<Candidate>& candidates_;
+    const CandidateList& candidates_;
     const Crossings& crossings_;
     double least_angle_;
     Array<Point> points_;            // positions in the image
@@ -193,9 +193,8 @@ private:
 }  // namespace
 
 template <class T>
-std::vector<Piece> cut_at_corners(std::vector<Piece> chains, const Frame<T>& frame,
-                                  const std::vector<Candidate>& candidates, const Crossings& crossings,
-                                  double least_angle, Team& team) {
+std::vector<Piece> cut_at_corners(std::vector<Piece> chains, const Frame<T>& frame, const CandidateList& candidates,
+                                  const Crossings& crossings, double least_angle, Team& team) {
     std::vector<std::vector<Piece>> parts(chains.size());
     parallel_each(static_cast<int>(chains.size()), team, [&](int i, int) {
         const auto k = static_cast<std::size_t>(i);
@@ -207,9 +206,9 @@ std::vector<Piece> cut_at_corners(std::vector<Piece> chains, const Frame<T>& fra
     return chains;
 }
 
-template std::vector<Piece> cut_at_corners(std::vector<Piece>, const Frame<float>&, const std::vector<Candidate>&,
+template std::vector<Piece> cut_at_corners(std::vector<Piece>, const Frame<float>&, const CandidateList&,
                                            const Crossings&, double, Team&);
-template std::vector<Piece> cut_at_corners(std::vector<Piece>, const Frame<double>&, const std::vector<Candidate>&,
+template std::vector<Piece> cut_at_corners(std::vector<Piece>, const Frame<double>&, const CandidateList&,
                                            const Crossings&, double, Team&);
 
 }  // namespace rangeedge

@@ -12,8 +12,7 @@ namespace rangeedge {
 
 // Parts between corners at which a chain turns by `least_angle` degrees or more.
 template <class T>
-std::vector<Piece> cut_at_corners(std::vector<Piece> chains, const Frame<T>& frame,
-                                  const std::vector<Candidate>& candidates, const Crossings& crossings,
-                                  double least_angle, Team& team);
+std::vector<Piece> cut_at_corners(std::vector<Piece> chains, const Frame<T>& frame, const CandidateList& candidates,
+                                  const Crossings& crossings, double least_angle, Team& team);
 
 }  // namespace rangeedge

@@ -32,7 +32,7 @@ struct Pair {
 
 class Joiner {
 public:
-    Joiner(std::vector<Piece>&& pieces, const std::vector<Candidate>& candidates, const Crossings& crossings,
+    Joiner(std::vector<Piece>&& pieces, const CandidateList& candidates, const Crossings& crossings,
            const JoinOptions& options)
         : pieces_(std::move(pieces)), candidates_(candidates), crossings_(crossings), options_(options) {}
 
@@ -157,7 +157,7 @@ private:
     }
 
     std::vector<Piece> pieces_;
-    const std::vector<Candidate>& candidates_;
+    const CandidateList& candidates_;
     const Crossings& crossings_;
     const JoinOptions& options_;
     std::vector<End> ends_;
@@ -167,8 +167,8 @@ private:
 
 }  // namespace
 
-std::vector<Piece> join_pieces(std::vector<Piece> pieces, const std::vector<Candidate>& candidates,
-                               const Crossings& crossings, const JoinOptions& options) {
+std::vector<Piece> join_pieces(std::vector<Piece> pieces, const CandidateList& candidates, const Crossings& crossings,
+                               const JoinOptions& options) {
     return Joiner(std::move(pieces), candidates, crossings, options).join();
 }
 

@@ -13,7 +13,7 @@ struct JoinOptions {
     double turn_angle;  // degrees that the direction may change from one to the other
 };
 
-std::vector<Piece> join_pieces(std::vector<Piece> pieces, const std::vector<Candidate>& candidates,
-                               const Crossings& crossings, const JoinOptions& options);
+std::vector<Piece> join_pieces(std::vector<Piece> pieces, const CandidateList& candidates, const Crossings& crossings,
+                               const JoinOptions& options);
 
 }  // namespace rangeedge

@@ -27,14 +27,14 @@ std::int32_t kind_of(EdgeClass type) {
 }  // namespace
 
 template <class T>
-LinkedEdges link_edges(const Frame<T>& frame, const std::vector<Candidate>& found, const std::uint8_t* thin,
+LinkedEdges link_edges(const Frame<T>& frame, const CandidateList& found, const std::uint8_t* thin,
                        const std::uint8_t* kinds, const LinkOptions& options, int threads) {
-    std::vector<Candidate> with_outlines;
+    CandidateList with_outlines;
     if (options.outlines) {
         with_outlines = outline_candidates(frame, kinds);
         with_outlines.insert(with_outlines.begin(), found.begin(), found.end());
     }
-    const std::vector<Candidate>& candidates = options.outlines ? with_outlines : found;
+    const CandidateList& candidates = options.outlines ? with_outlines : found;
     const Tracing tracing = trace_paths(thin, frame.rows, frame.cols);
     const Crossings crossings = assign_candidates(candidates, tracing, frame.rows, frame.cols);
     std::vector<Piece> chains = join_pieces(find_pieces(candidates, tracing, crossings, kinds, frame.cols), candidates,
@@ -62,9 +62,9 @@ LinkedEdges link_edges(const Frame<T>& frame, const std::vector<Candidate>& foun
     return result;
 }
 
-template LinkedEdges link_edges(const Frame<float>&, const std::vector<Candidate>&, const std::uint8_t*,
-                                const std::uint8_t*, const LinkOptions&, int);
-template LinkedEdges link_edges(const Frame<double>&, const std::vector<Candidate>&, const std::uint8_t*,
-                                const std::uint8_t*, const LinkOptions&, int);
+template LinkedEdges link_edges(const Frame<float>&, const CandidateList&, const std::uint8_t*, const std::uint8_t*,
+                                const LinkOptions&, int);
+template LinkedEdges link_edges(const Frame<double>&, const CandidateList&, const std::uint8_t*, const std::uint8_t*,
+                                const LinkOptions&, int);
 
 }  // namespace rangeedge

@@ -49,7 +49,7 @@ struct LinkedEdges {
 
 // `candidates` are those of the frame in any order; `thin` is a map of lines, `kinds` that of the kinds of pixels.
 template <class T>
-LinkedEdges link_edges(const Frame<T>& frame, const std::vector<Candidate>& candidates, const std::uint8_t* thin,
+LinkedEdges link_edges(const Frame<T>& frame, const CandidateList& candidates, const std::uint8_t* thin,
                        const std::uint8_t* kinds, const LinkOptions& options, int threads);
 
 }  // namespace rangeedge

@@ -77,9 +77,9 @@ private:
 }  // namespace
 
 template <class T>
-std::vector<Candidate> outline_candidates(const Frame<T>& frame, const std::uint8_t* kinds) {
+CandidateList outline_candidates(const Frame<T>& frame, const std::uint8_t* kinds) {
     const Outliner<T> outliner(frame);
-    std::vector<Candidate> found;
+    CandidateList found;
     for (int row = 0; row < frame.rows; ++row) {
         Watch::checkpoint();
         for (int col = 0; col < frame.cols; ++col) {
@@ -97,7 +97,7 @@ std::vector<Candidate> outline_candidates(const Frame<T>& frame, const std::uint
     return found;
 }
 
-template std::vector<Candidate> outline_candidates(const Frame<float>&, const std::uint8_t*);
-template std::vector<Candidate> outline_candidates(const Frame<double>&, const std::uint8_t*);
+template CandidateList outline_candidates(const Frame<float>&, const std::uint8_t*);
+template CandidateList outline_candidates(const Frame<double>&, const std::uint8_t*);
 
 }  // namespace rangeedge

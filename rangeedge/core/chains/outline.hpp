@@ -11,6 +11,6 @@ namespace rangeedge {
 // Candidates half a pixel beyond the pixels that are boundaries and no other edges, of kind `boundary_bit`, with
 // `occluding_bit` where the data is before them.
 template <class T>
-std::vector<Candidate> outline_candidates(const Frame<T>& frame, const std::uint8_t* kinds);
+CandidateList outline_candidates(const Frame<T>& frame, const std::uint8_t* kinds);
 
 }  // namespace rangeedge

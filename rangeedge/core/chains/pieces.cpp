@@ -43,7 +43,7 @@ EdgeClass class_of(const Candidate& c, const Point& along) {
 
 class Divider {
 public:
-    Divider(const std::vector<Candidate>& candidates, const Tracing& tracing, const Crossings& crossings,
+    Divider(const CandidateList& candidates, const Tracing& tracing, const Crossings& crossings,
             const std::uint8_t* kinds, int cols)
         : candidates_(candidates), tracing_(tracing), crossings_(crossings), kinds_(kinds), cols_(cols) {}
 
@@ -99,7 +99,7 @@ private:
         }
     }
 
-    const std::vector<Candidate>& candidates_;
+    const CandidateList& candidates_;
     const Tracing& tracing_;
     const Crossings& crossings_;
     const std::uint8_t* kinds_;
@@ -116,7 +116,7 @@ Point scan_step(const Candidate& c) {
     return {static_cast<double>(step.dcol), static_cast<double>(step.drow)};
 }
 
-Crossings assign_candidates(const std::vector<Candidate>& candidates, const Tracing& tracing, int rows, int cols) {
+Crossings assign_candidates(const CandidateList& candidates, const Tracing& tracing, int rows, int cols) {
     Array<std::int32_t> nearest(static_cast<std::ptrdiff_t>(candidates.size()), -1);
     Crossings result;
     result.first.resize(tracing.pixels.size() + 1, 0);
@@ -150,8 +150,8 @@ Crossings assign_candidates(const std::vector<Candidate>& candidates, const Trac
     return result;
 }
 
-bool mean_position(const std::vector<Candidate>& candidates, const Crossings& crossings, std::int32_t place,
-                   EdgeClass type, Point& mean) {
+bool mean_position(const CandidateList& candidates, const Crossings& crossings, std::int32_t place, EdgeClass type,
+                   Point& mean) {
     mean = {0, 0};
     int count = 0;
     for (std::int32_t k = crossings.first[place]; k < crossings.first[place + 1]; ++k) {
@@ -164,8 +164,8 @@ bool mean_position(const std::vector<Candidate>& candidates, const Crossings& cr
     return count > 0;
 }
 
-std::vector<Piece> find_pieces(const std::vector<Candidate>& candidates, const Tracing& tracing,
-                               const Crossings& crossings, const std::uint8_t* kinds, int cols) {
+std::vector<Piece> find_pieces(const CandidateList& candidates, const Tracing& tracing, const Crossings& crossings,
+                               const std::uint8_t* kinds, int cols) {
     return Divider(candidates, tracing, crossings, kinds, cols).divide();
 }
 

@@ -36,7 +36,7 @@ struct Point {
     double x, y;
 };
 
-Crossings assign_candidates(const std::vector<Candidate>& candidates, const Tracing& tracing, int rows, int cols);
+Crossings assign_candidates(const CandidateList& candidates, const Tracing& tracing, int rows, int cols);
 
 // The step of a candidate's scan line.
 Point scan_step(const Candidate& c);
@@ -49,11 +49,11 @@ inline bool belongs(const Candidate& c, EdgeClass type) {
 }
 
 // The mean position of the candidates of a class at a place; false if there are none.
-bool mean_position(const std::vector<Candidate>& candidates, const Crossings& crossings, std::int32_t place,
-                   EdgeClass type, Point& mean);
+bool mean_position(const CandidateList& candidates, const Crossings& crossings, std::int32_t place, EdgeClass type,
+                   Point& mean);
 
 // `kinds` are those of the pixels of the image.
-std::vector<Piece> find_pieces(const std::vector<Candidate>& candidates, const Tracing& tracing,
-                               const Crossings& crossings, const std::uint8_t* kinds, int cols);
+std::vector<Piece> find_pieces(const CandidateList& candidates, const Tracing& tracing, const Crossings& crossings,
+                               const std::uint8_t* kinds, int cols);
 
 }  // namespace rangeedge

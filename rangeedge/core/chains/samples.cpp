@@ -30,7 +30,7 @@ std::ptrdiff_t frayed(const Array<Point>& means, bool at_end) {
 
 }  // namespace
 
-ChainSamples gather_samples(const Piece& chain, const std::vector<Candidate>& candidates, const Crossings& crossings) {
+ChainSamples gather_samples(const Piece& chain, const CandidateList& candidates, const Crossings& crossings) {
     ChainSamples result;
     result.closed = chain.closed;
     Array<Point>& means = result.means;

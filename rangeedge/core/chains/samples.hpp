@@ -42,6 +42,6 @@ double ordinate_at(const Frame<T>& frame, std::int32_t pixel) {
     return frame.projective ? 1 / along : -along;
 }
 
-ChainSamples gather_samples(const Piece& chain, const std::vector<Candidate>& candidates, const Crossings& crossings);
+ChainSamples gather_samples(const Piece& chain, const CandidateList& candidates, const Crossings& crossings);
 
 }  // namespace rangeedge

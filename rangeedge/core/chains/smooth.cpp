@@ -40,8 +40,7 @@ struct SlopeSums {
 template <class T>
 class Smoother {
 public:
-    Smoother(const Piece& chain, const Frame<T>& frame, const std::vector<Candidate>& candidates,
-             const Crossings& crossings)
+    Smoother(const Piece& chain, const Frame<T>& frame, const CandidateList& candidates, const Crossings& crossings)
         : frame_(frame), gathered_(gather_samples(chain, candidates, crossings)), means_(gathered_.means),
           samples_(gathered_.samples), closed_(chain.closed), jumps_(is_one_sided(chain.type)) {}
 
@@ -365,12 +364,12 @@ private:
 }  // namespace
 
 template <class T>
-SmoothChain smooth_chain(const Piece& chain, const Frame<T>& frame, const std::vector<Candidate>& candidates,
+SmoothChain smooth_chain(const Piece& chain, const Frame<T>& frame, const CandidateList& candidates,
                          const Crossings& crossings) {
     return Smoother<T>(chain, frame, candidates, crossings).smooth();
 }
 
-template SmoothChain smooth_chain(const Piece&, const Frame<float>&, const std::vector<Candidate>&, const Crossings&);
-template SmoothChain smooth_chain(const Piece&, const Frame<double>&, const std::vector<Candidate>&, const Crossings&);
+template SmoothChain smooth_chain(const Piece&, const Frame<float>&, const CandidateList&, const Crossings&);
+template SmoothChain smooth_chain(const Piece&, const Frame<double>&, const CandidateList&, const Crossings&);
 
 }  // namespace rangeedge

@@ -19,7 +19,7 @@ struct SmoothChain {
 };
 
 template <class T>
-SmoothChain smooth_chain(const Piece& chain, const Frame<T>& frame, const std::vector<Candidate>& candidates,
+SmoothChain smooth_chain(const Piece& chain, const Frame<T>& frame, const CandidateList& candidates,
                          const Crossings& crossings);
 
 }  // namespace rangeedge

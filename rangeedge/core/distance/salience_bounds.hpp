@@ -46,11 +46,10 @@ struct Candidates {
     }
 
 private:
-    void gather(const std::vector<float>& from, std::vector<float>& to) const {
+    void gather(const Array<float>& from, std::vector<float>& to) const {
         to.resize(static_cast<std::size_t>(count()));
         for (std::size_t i = 0; i < groups.size(); ++i)
-            std::memcpy(&to[i * group_size], &from[static_cast<std::size_t>(groups[i]) * group_size],
-                        group_size * sizeof(float));
+            std::memcpy(&to[i * group_size], &from[std::ptrdiff_t{groups[i]} * group_size], group_size * sizeof(float));
     }
 };
 

@@ -7,8 +7,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 #include <vector>
 
+#include "base/array.hpp"
 #include "base/parallel.hpp"
 #include "distance/distance.hpp"
 
@@ -18,11 +20,6 @@ constexpr int tile_size = 8;   // pixels of the smallest block, across and down
 constexpr int group_size = 4;  // slots that lie together in memory: the four parts of a block
 constexpr float huge_weight = 0x1p64f, far_away = -0x1p25f;  // of an empty slot: bounds above all others, and finite
 
-template <class T>
-void append(std::vector<T>& to, const std::vector<T>& more) {
-    to.insert(to.end(), more.begin(), more.end());
-}
-
 struct Source {
     float level;  // as in the map
     std::int32_t label;
@@ -30,32 +27,28 @@ struct Source {
 
 // Sources, or the strongest ones of blocks: w = 1 / s^2 and position.
 struct Points {
-    std::vector<float> weight, x, y;
+    Array<float> weight, x, y;
 
-    int groups() const { return static_cast<int>(weight.size()) / group_size; }
-    void append(const Points& more) {
-        rangeedge::append(weight, more.weight);
-        rangeedge::append(x, more.x);
-        rangeedge::append(y, more.y);
+    int groups() const { return weight.count() / group_size; }
+    void resize(int slots) {
+        for (Array<float>* values : {&weight, &x, &y}) values->resize(slots);
     }
 };
 
 struct Sources : Points {
-    std::vector<Source> exact;
+    Array<Source> exact;
 
-    void push(float w, float col, float row, const Source& source) {
-        weight.push_back(w);
-        x.push_back(col);
-        y.push_back(row);
-        exact.push_back(source);
+    void resize(int slots) {
+        Points::resize(slots);
+        exact.resize(slots);
     }
-    void fill_group() {
-        while (weight.size() % group_size) push(huge_weight, far_away, far_away, {});
+    void set(int slot, float w, float col, float row, const Source& source) {
+        weight[slot] = w;
+        x[slot] = col;
+        y[slot] = row;
+        exact[slot] = source;
     }
-    void append(const Sources& more) {
-        Points::append(more);
-        rangeedge::append(exact, more.exact);
-    }
+    void clear(int slot) { set(slot, huge_weight, far_away, far_away, {}); }
 };
 
 // Sums over the sources of a block, for a plane through their saliences.
@@ -114,35 +107,28 @@ struct Block {
 };
 
 struct Blocks : Points {
-    std::vector<float> left, right, top, bottom, peak, slope_x, slope_y;
-    std::vector<int> begin, end;
+    Array<float> left, right, top, bottom, peak, slope_x, slope_y;
+    Array<int> begin, end;
 
-    void push(const Block& block) {
-        weight.push_back(block.weight);
-        x.push_back(block.x);
-        y.push_back(block.y);
-        left.push_back(block.left);
-        right.push_back(block.right);
-        top.push_back(block.top);
-        bottom.push_back(block.bottom);
-        peak.push_back(block.peak);
-        slope_x.push_back(block.slope_x);
-        slope_y.push_back(block.slope_y);
-        begin.push_back(block.begin);
-        end.push_back(block.end);
+    void resize(int slots) {
+        Points::resize(slots);
+        for (Array<float>* values : {&left, &right, &top, &bottom, &peak, &slope_x, &slope_y}) values->resize(slots);
+        begin.resize(slots);
+        end.resize(slots);
     }
-    // `parts` groups of parts come before those of `more`.
-    void append(const Blocks& more, int parts) {
-        Points::append(more);
-        rangeedge::append(left, more.left);
-        rangeedge::append(right, more.right);
-        rangeedge::append(top, more.top);
-        rangeedge::append(bottom, more.bottom);
-        rangeedge::append(peak, more.peak);
-        rangeedge::append(slope_x, more.slope_x);
-        rangeedge::append(slope_y, more.slope_y);
-        for (const int group : more.begin) begin.push_back(group + parts);
-        for (const int group : more.end) end.push_back(group + parts);
+    void set(int slot, const Block& block) {
+        weight[slot] = block.weight;
+        x[slot] = block.x;
+        y[slot] = block.y;
+        left[slot] = block.left;
+        right[slot] = block.right;
+        top[slot] = block.top;
+        bottom[slot] = block.bottom;
+        peak[slot] = block.peak;
+        slope_x[slot] = block.slope_x;
+        slope_y[slot] = block.slope_y;
+        begin[slot] = block.begin;
+        end[slot] = block.end;
     }
 };
 
@@ -152,52 +138,68 @@ template <class T>
 class SourceTree {
 public:
     SourceTree(const T* salience, const Grid& grid, int top, Team& team)
-        : levels(static_cast<std::size_t>(top) + 1), salience_(salience), grid_(grid),
-          beyond_(grid.wrap ? grid.cols / 2 : 0) {
-        // The branches below the highest level grow side by side.
+        : levels(at(top) + 1), salience_(salience), grid_(grid), beyond_(grid.wrap ? grid.cols / 2 : 0) {
+        // The branches below the highest level are counted, and then grow, side by side.
         const int size = tile_size << top;
         const int across = (grid.cols + 2 * beyond_ - 1) / size + 1, down = (grid.rows - 1) / size + 1;
-        std::vector<Branch> branches(static_cast<std::size_t>(across) * static_cast<std::size_t>(down));
-        parallel_each(across * down, team, [&](int i, int) {
-            Branch& branch = branches[static_cast<std::size_t>(i)];
-            branch.levels.resize(static_cast<std::size_t>(top));
+        std::vector<Slots> next(at(across) * at(down), Slots(at(top) + 1, 0));
+        const auto for_branches = [&](auto&& visit) {
+            parallel_each(across * down, team,
+                          [&](int i, int) { visit(i, i / across * size, i % across * size - beyond_); });
+        };
+        for_branches([&](int i, int y, int x) { count(top, y, x, next[at(i)]); });
+        Slots total(at(top) + 1, 0);
+        for (Slots& slots : next)
+            for (std::size_t kind = 0; kind < slots.size(); ++kind)
+                total[kind] += std::exchange(slots[kind], total[kind]);
+        sources.resize(total[0]);
+        for (int level = 0; level < top; ++level) levels[at(level)].resize(total[at(level) + 1]);
+        Blocks& roots = levels.back();
+        const int branches = across * down, slots = (branches + group_size - 1) / group_size * group_size;
+        roots.resize(slots);
+        for_branches([&](int i, int y, int x) {
             Moments moments;
-            branch.root = grow(branch, top, i / across * size, i % across * size - beyond_, moments);
+            roots.set(i, grow(top, y, x, next[at(i)], moments));
         });
-        for (Branch& branch : branches) {
-            const auto parts_before = [&](std::size_t level) {
-                return level > 0 ? levels[level - 1].groups() : sources.groups();
-            };
-            Blocks root;
-            root.push(branch.root);
-            levels.back().append(root, parts_before(levels.size() - 1));
-            for (std::size_t level = levels.size() - 1; level-- > 0;)
-                levels[level].append(branch.levels[level], parts_before(level));
-            sources.append(branch.sources);
-            branch = {};
-        }
-        while (levels.back().weight.size() % group_size) levels.back().push({});
+        for (int i = branches; i < slots; ++i) roots.set(i, {});
     }
 
     Sources sources;
     std::vector<Blocks> levels;
 
 private:
-    struct Branch {
-        Block root;
-        std::vector<Blocks> levels;
-        Sources sources;
-    };
+    // Of a branch: how many slots it takes for its sources, and for its blocks of every level below the highest; then
+    // the next ones of them.
+    using Slots = std::vector<int>;
 
-    Block grow(Branch& branch, int level, int y, int x, Moments& moments) const {
+    static std::size_t at(int index) { return static_cast<std::size_t>(index); }
+
+    // Whether there are sources in a block.
+    bool count(int level, int y, int x, Slots& slots) const {
+        if (y >= grid_.rows || x >= grid_.cols + beyond_) return false;
+        if (level == 0) {
+            int found = 0;
+            for_sources(y, x, [&](int, int, std::size_t) { ++found; });
+            slots[0] += (found + group_size - 1) / group_size * group_size;
+            return found > 0;
+        }
+        Watch::checkpoint();
+        const int half = tile_size << (level - 1);
+        bool any = false;
+        for (int k = 0; k < group_size; ++k) any |= count(level - 1, y + k / 2 * half, x + k % 2 * half, slots);
+        if (any) slots[at(level)] += group_size;
+        return any;
+    }
+
+    Block grow(int level, int y, int x, Slots& next, Moments& moments) {
         if (y >= grid_.rows || x >= grid_.cols + beyond_) return {};
-        if (level == 0) return smallest_block(branch.sources, y, x, moments);
+        if (level == 0) return smallest_block(y, x, next[0], moments);
         Watch::checkpoint();
         const int half = tile_size << (level - 1);
         Block whole, parts[group_size];
         for (int k = 0; k < group_size; ++k) {
             Moments own;
-            parts[k] = grow(branch, level - 1, y + k / 2 * half, x + k % 2 * half, own);
+            parts[k] = grow(level - 1, y + k / 2 * half, x + k % 2 * half, next, own);
             if (parts[k].empty()) continue;
             whole.add(parts[k]);
             moments.add(own);
@@ -212,10 +214,10 @@ private:
                 std::abs(double(part.slope_y) - whole.slope_y) * (0.5 * (double(part.bottom) - part.top));
             whole.raise_to(part.peak - whole.rise(part.middle_x(), part.middle_y()) + reach);
         }
-        Blocks& finer = branch.levels[static_cast<std::size_t>(level) - 1];
-        whole.begin = finer.groups();
+        int& slot = next[at(level)];
+        whole.begin = slot / group_size;
         whole.end = whole.begin + 1;
-        for (const Block& part : parts) finer.push(part);
+        for (const Block& part : parts) levels[at(level) - 1].set(slot++, part);
         return whole;
     }
 
@@ -224,35 +226,39 @@ private:
         return std::memcmp(values, none, sizeof(T) * static_cast<std::size_t>(n)) == 0;
     }
 
-    Block smallest_block(Sources& found, int y0, int x0, Moments& moments) const {
+    // Calls visit(row, position, pixel) for the sources of a smallest block.
+    template <class Visit>
+    void for_sources(int y0, int x0, Visit&& visit) const {
         const int y1 = std::min(y0 + tile_size, grid_.rows), x1 = std::min(x0 + tile_size, grid_.cols + beyond_);
-        const int begin = found.groups();
-        const std::size_t first = found.weight.size();
-        Block whole;
         for (int y = y0; y < y1; ++y) {
             if (x0 >= 0 && x1 <= grid_.cols && is_blank(salience_ + grid_.index(y, x0), x1 - x0)) continue;
             for (int position = x0; position < x1; ++position) {
-                const int x = position < 0 ? position + grid_.cols : position % grid_.cols;
-                const std::size_t p = grid_.index(y, x);
-                const double level = static_cast<double>(salience_[p]);
-                if (level < least_salience) continue;
-                const double s = level / salience_unit<T>;
-                const auto w = static_cast<float>(1.0 / (s * s)), col = static_cast<float>(position),
-                           line = static_cast<float>(y);
-                found.push(w, col, line, {static_cast<float>(salience_[p]), static_cast<std::int32_t>(p)});
-                Block source{w, col, line, col, col, line, line};
-                source.end = 1;  // not empty
-                whole.add(source);
-                moments.add(position, y, s);
+                const std::size_t p = grid_.index(y, position < 0 ? position + grid_.cols : position % grid_.cols);
+                if (static_cast<double>(salience_[p]) >= least_salience) visit(y, position, p);
             }
         }
+    }
+
+    Block smallest_block(int y0, int x0, int& slot, Moments& moments) {
+        const int first = slot;
+        Block whole;
+        for_sources(y0, x0, [&](int y, int position, std::size_t p) {
+            const double s = static_cast<double>(salience_[p]) / salience_unit<T>;
+            const auto w = static_cast<float>(1.0 / (s * s)), col = static_cast<float>(position),
+                       line = static_cast<float>(y);
+            sources.set(slot++, w, col, line, {static_cast<float>(salience_[p]), static_cast<std::int32_t>(p)});
+            Block source{w, col, line, col, col, line, line};
+            source.end = 1;  // not empty
+            whole.add(source);
+            moments.add(position, y, s);
+        });
         if (moments.n == 0) return {};
         whole.fit_slopes(moments);
-        for (std::size_t i = first; i < found.weight.size(); ++i)
-            whole.raise_to(found.exact[i].level / salience_unit<T> - whole.rise(found.x[i], found.y[i]));
-        found.fill_group();
-        whole.begin = begin;
-        whole.end = found.groups();
+        for (int i = first; i < slot; ++i)
+            whole.raise_to(sources.exact[i].level / salience_unit<T> - whole.rise(sources.x[i], sources.y[i]));
+        while (slot % group_size) sources.clear(slot++);
+        whole.begin = first / group_size;
+        whole.end = slot / group_size;
         return whole;
     }
 

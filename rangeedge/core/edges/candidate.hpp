@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <vector>
+
+#include "base/memory.hpp"
 
 namespace rangeedge {
 
@@ -35,5 +38,7 @@ struct Candidate {
     Side sides[2];
     float plane_position[2], plane_direction[2];  // of the edge, and of its scan line, in the plane of the image
 };
+
+using CandidateList = std::vector<Candidate, LargeAllocator<Candidate>>;
 
 }  // namespace rangeedge

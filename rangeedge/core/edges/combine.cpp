@@ -22,7 +22,7 @@ struct Band {
     }
 };
 
-void combine(const std::vector<Candidate>& candidates, const Band& band, const EdgeMaps& maps) {
+void combine(const CandidateList& candidates, const Band& band, const EdgeMaps& maps) {
     const auto [size, jump, crease, kind, significance] = maps;
     const std::ptrdiff_t pixels = band.last - band.first;
     for (float* map : {jump, crease, significance}) std::fill_n(map + band.first, pixels, 0.0f);
@@ -66,7 +66,7 @@ void combine(const std::vector<Candidate>& candidates, const Band& band, const E
 
 }  // namespace
 
-void combine(const std::vector<Candidate>& candidates, const EdgeMaps& maps, Team& team) {
+void combine(const CandidateList& candidates, const EdgeMaps& maps, Team& team) {
     // Candidates lie row by row of the image, nearly: where their number is divided evenly, pixels are.
     const auto border = [&](int i) {
         if (i == 0 || i == team.size() || candidates.empty()) return i == 0 ? 0 : maps.size;

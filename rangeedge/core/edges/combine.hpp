@@ -23,6 +23,6 @@ struct EdgeMaps {
 
 // The maps hold zeros where there are none. Of equal creases, convex. The order of candidates decides nothing but how
 // evenly threads share them: they should lie row by row.
-void combine(const std::vector<Candidate>& candidates, const EdgeMaps& maps, Team& team);
+void combine(const CandidateList& candidates, const EdgeMaps& maps, Team& team);
 
 }  // namespace rangeedge

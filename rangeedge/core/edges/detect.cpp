@@ -25,7 +25,7 @@ constexpr int least_outlined = 3;      // samples of a surface beside a wide gap
 
 // Candidates of some lines, and the pixels over which steps are smeared there.
 struct Found {
-    std::vector<Candidate> candidates;
+    CandidateList candidates;
     std::vector<std::int32_t> smeared;
 };
 
@@ -91,7 +91,8 @@ private:
         if (trace_)
             trace_->back().smeared = 1, trace_->back().cut = trace_->back().sample = (step.low + step.high) / 2.0;
         for (int k = step.before + 1; k < step.after; ++k)
-            if (line.ordinate(k) == line.ordinate(k)) smeared.push_back(static_cast<std::int32_t>(line.pixel(k)));
+            if (line.ordinate(k) == line.ordinate(k) && line.has_data(k))
+                smeared.push_back(static_cast<std::int32_t>(line.pixel(k)));
         return step.next;
     }
 
@@ -200,8 +201,8 @@ private:
         c.y = static_cast<float>(line.path.row + edge.sample * line.path.drow);
         c.shift = static_cast<float>(edge.shift);
         c.direction = static_cast<std::uint8_t>(direction_);
-        c.before = static_cast<std::int32_t>(line.pixel(edge.before));
-        c.after = static_cast<std::int32_t>(line.pixel(edge.after));
+        c.before = static_cast<std::int32_t>(line.pixel_with_data(edge.before, -1));
+        c.after = static_cast<std::int32_t>(line.pixel_with_data(edge.after, 1));
         const double w = line.start + line.step * edge.abscissa, *d = line.direction;
         if (line.curved) {
             const PlaneImage image(line.rays, w);
@@ -270,8 +271,8 @@ void clear_smear(std::vector<Part>& parts, int rows, int cols, int directions, T
 }  // namespace
 
 template <class T>
-std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, Team& team,
-                                       std::uint8_t* smeared, std::vector<Candidate>* weak) {
+CandidateList find_candidates(const Frame<T>& frame, const ScanLineOptions& options, Team& team, std::uint8_t* smeared,
+                              CandidateList* weak) {
     std::vector<Part> parts = parts_of(options.directions, frame.rows, frame.cols);
     // Any thread may take any part: they are many, and what they cost differs.
     std::atomic<std::size_t> taken{0};
@@ -294,7 +295,7 @@ std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOpti
     for (const Part& part : parts)
         for (const Candidate& c : part.found.candidates) found.push_back(&c);
     NeighbourGrid grid(frame.rows, frame.cols, team);
-    std::vector<Candidate> candidates = in_place(found, grid);
+    CandidateList candidates = in_place(found, grid);
     parts.clear();
     join_neighbours(candidates, grid, frame, options, weak);
     return candidates;
@@ -318,7 +319,8 @@ LineTrace trace_line(const Frame<T>& frame, const ScanLineOptions& options, int 
     detector.detect(strip, approximator, found);
     const Line<T>& line = strip.lines.front();
     for (int k = 0; k < line.path.size; ++k) {
-        const double x = line.abscissa(k), y = line.ordinate(k), tolerance = line.tolerance_at(k);
+        const double x = line.abscissa(k), tolerance = line.tolerance_at(k);
+        const double y = line.has_data(k) ? line.ordinate(k) : NAN;
         const double z = line.depth(y, x), off = std::abs(line.depth(y + tolerance, x) - z);
         trace.samples.push_back({double(line.path.col + k * line.path.dcol), double(line.path.row + k * line.path.drow),
                                  x, y, z, NAN, NAN, tolerance, off});
@@ -338,7 +340,7 @@ LineTrace trace_line(const Frame<T>& frame, const ScanLineOptions& options, int 
     return trace;
 }
 
-void put_in_order(std::vector<Candidate>& candidates) {
+void put_in_order(CandidateList& candidates) {
     Checkpoints checkpoints;
     std::sort(candidates.begin(), candidates.end(), [&](const Candidate& a, const Candidate& b) {
         checkpoints.pass();
@@ -346,9 +348,9 @@ void put_in_order(std::vector<Candidate>& candidates) {
     });
 }
 
-#define RANGEEDGE_INSTANTIATE(T)                                                                                   \
-    template std::vector<Candidate> find_candidates(const Frame<T>&, const ScanLineOptions&, Team&, std::uint8_t*, \
-                                                    std::vector<Candidate>*);                                      \
+#define RANGEEDGE_INSTANTIATE(T)                                                                          \
+    template CandidateList find_candidates(const Frame<T>&, const ScanLineOptions&, Team&, std::uint8_t*, \
+                                           CandidateList*);                                               \
     template LineTrace trace_line(const Frame<T>&, const ScanLineOptions&, int, int, int);
 RANGEEDGE_INSTANTIATE(float)
 RANGEEDGE_INSTANTIATE(double)

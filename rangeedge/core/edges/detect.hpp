@@ -24,10 +24,10 @@ constexpr double lone_significance = 3;  // standard deviations that a candidate
 // at pixels over which a step is smeared (smear.hpp); it holds zeros before. `weak`, unless null, receives the
 // candidates that were dropped because they and their neighbours are not significant.
 template <class T>
-std::vector<Candidate> find_candidates(const Frame<T>& frame, const ScanLineOptions& options, Team& team,
-                                       std::uint8_t* smeared = nullptr, std::vector<Candidate>* weak = nullptr);
+CandidateList find_candidates(const Frame<T>& frame, const ScanLineOptions& options, Team& team,
+                              std::uint8_t* smeared = nullptr, CandidateList* weak = nullptr);
 
 // Brings them into their order along directions and lines.
-void put_in_order(std::vector<Candidate>& candidates);
+void put_in_order(CandidateList& candidates);
 
 }  // namespace rangeedge

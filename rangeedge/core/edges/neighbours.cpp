@@ -34,8 +34,8 @@ RANGEEDGE_VERSIONS(float, evidence, (const NeighbourGrid::Near& near), (near))
 
 }  // namespace
 
-std::vector<Candidate> in_place(const std::vector<const Candidate*>& found, NeighbourGrid& grid) {
-    std::vector<Candidate> candidates(found.size());
+CandidateList in_place(const std::vector<const Candidate*>& found, NeighbourGrid& grid) {
+    CandidateList candidates(found.size());
     const auto at = [&](int i) -> const Candidate& { return *found[static_cast<std::size_t>(i)]; };
     grid.sort(static_cast<int>(found.size()), evidence_field + 1, at, [&](std::int32_t i, std::int32_t k) {
         Candidate& c = candidates[static_cast<std::size_t>(k)];
@@ -47,8 +47,8 @@ std::vector<Candidate> in_place(const std::vector<const Candidate*>& found, Neig
 }
 
 template <class T>
-void join_neighbours(std::vector<Candidate>& candidates, NeighbourGrid& grid, const Frame<T>& frame,
-                     const ScanLineOptions& options, std::vector<Candidate>* weak_ones) {
+void join_neighbours(CandidateList& candidates, NeighbourGrid& grid, const Frame<T>& frame,
+                     const ScanLineOptions& options, CandidateList* weak_ones) {
     const auto least = static_cast<float>(options.min_significance);
     const bool aligned = options.max_shift > 0;
     if (!(least > 0 || aligned || options.normals)) return;
@@ -95,9 +95,9 @@ void join_neighbours(std::vector<Candidate>& candidates, NeighbourGrid& grid, co
     });
 }
 
-#define RANGEEDGE_INSTANTIATE(T)                                                                                    \
-    template void join_neighbours(std::vector<Candidate>&, NeighbourGrid&, const Frame<T>&, const ScanLineOptions&, \
-                                  std::vector<Candidate>*);
+#define RANGEEDGE_INSTANTIATE(T)                                                                           \
+    template void join_neighbours(CandidateList&, NeighbourGrid&, const Frame<T>&, const ScanLineOptions&, \
+                                  CandidateList*);
 RANGEEDGE_INSTANTIATE(float)
 RANGEEDGE_INSTANTIATE(double)
 

@@ -21,11 +21,11 @@
 namespace rangeedge {
 
 // Candidates in the order of their places, which they are numbered by as they come; `grid` has room for what follows.
-std::vector<Candidate> in_place(const std::vector<const Candidate*>& found, NeighbourGrid& grid);
+CandidateList in_place(const std::vector<const Candidate*>& found, NeighbourGrid& grid);
 
 // `grid` is as `in_place` leaves it. `weak`, unless null, receives those dropped.
 template <class T>
-void join_neighbours(std::vector<Candidate>& candidates, NeighbourGrid& grid, const Frame<T>& frame,
-                     const ScanLineOptions& options, std::vector<Candidate>* weak);
+void join_neighbours(CandidateList& candidates, NeighbourGrid& grid, const Frame<T>& frame,
+                     const ScanLineOptions& options, CandidateList* weak);
 
 }  // namespace rangeedge

@@ -109,7 +109,7 @@ double normal_angle(const NeighbourGrid::Near& near, bool projective) {
     return angle_between(std::sqrt(x * x + y * y + z * z), dot);
 }
 
-void fill_tangents(const std::vector<Candidate>& candidates, NeighbourGrid& grid) {
+void fill_tangents(const CandidateList& candidates, NeighbourGrid& grid) {
     grid.for_each([&](std::size_t i, std::ptrdiff_t k) {
         const Candidate& c = candidates[i];
         // Zero times infinity would spoil sums in which a candidate has no weight.

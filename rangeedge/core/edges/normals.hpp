@@ -16,7 +16,7 @@ namespace rangeedge {
 
 // Fills the fields of a grid, of which there are `tangent_fields`, with what `normal_angle` asks of its candidates.
 constexpr int tangent_fields = first_field + 10;
-void fill_tangents(const std::vector<Candidate>& candidates, NeighbourGrid& grid);
+void fill_tangents(const CandidateList& candidates, NeighbourGrid& grid);
 
 // In degrees; negative where the neighbours do not fix it.
 double normal_angle(const NeighbourGrid::Near& near, bool projective);

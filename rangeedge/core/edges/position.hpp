@@ -44,8 +44,8 @@ Position adapted_position(const Line<T>& line, const Approximation& a, std::ptrd
     double x = 0;
     if (!(max_shift > 0)) return cut;
     if (!intersection(a.curves[i], a.curves[i + 1], cut.abscissa, reach, x)) return cut;
-    const double x1 = line.abscissa(left.last), x2 = line.abscissa(right.first);
-    if (x >= x1 && x <= x2)
+    const double x1 = line.abscissa(left.last), x2 = line.abscissa(right.first), rounding = 1e-9 * (x2 - x1);
+    if (x >= x1 - rounding && x <= x2 + rounding)
         return moved(left.last, right.first, x, left.last + (right.first - left.last) * (x - x1) / (x2 - x1));
     // Beyond the end of a segment: its samples up to there go to the other curve.
     const bool leftward = x < x1;
@@ -55,7 +55,7 @@ Position adapted_position(const Line<T>& line, const Approximation& a, std::ptrd
     for (int k = begin; k != end; k += step) {
         const double here = line.abscissa(k), next = line.abscissa(k + step);
         if (std::abs(line.ordinate(k) - other.value(here)) > line.tolerance_at(k)) return cut;
-        if (leftward ? x < next : x > next) continue;
+        if (leftward ? x < next - rounding : x > next + rounding) continue;
         const int before = leftward ? k - 1 : k;
         return moved(before, before + 1, x, k + step * (x - here) / (next - here));
     }

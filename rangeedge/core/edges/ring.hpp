@@ -5,15 +5,29 @@
 #include <array>
 #include <cstdint>
 
+#include "base/simd.hpp"
+
 namespace rangeedge {
 
 // Bits of a byte: east, northeast, north, and so on around; the even ones are the 4-neighbours.
 using Ring = unsigned;
-constexpr Ring four = 0x55, diagonal = 0xaa;
+constexpr std::uint8_t four = 0x55, diagonal = 0xaa;
 constexpr int east = 0, north = 2, west = 4, south = 6;
 
+// What follows takes rings of single pixels, and vectors of bytes that are rings.
+
 // The ring turned: what lies `steps` bits further around every neighbour.
-constexpr Ring turned(Ring ring, int steps) { return (ring >> steps | ring << (8 - steps)) & 255u; }
+template <class R>
+RANGEEDGE_INLINE constexpr R turned(R ring, int steps) {
+    return (ring >> steps | ring << (8 - steps)) & 255;
+}
+
+// A bit for each of the parts into which the neighbours fall, Yokoi's connectivity number of them; 0 inside and of a
+// lone pixel.
+template <class R>
+RANGEEDGE_INLINE constexpr R parts(R on) {
+    return ~on & (turned(on, 1) | turned(on, 2)) & four;
+}
 
 constexpr int count(Ring ring) {
     int bits = 0;
@@ -30,11 +44,7 @@ struct Kind {
 
 constexpr std::array<Kind, 256> list_kinds() {
     std::array<Kind, 256> kinds{};
-    for (Ring on = 0; on < 256; ++on) {
-        // Yokoi's connectivity number: into how many parts the neighbours fall; 0 inside and of a lone pixel.
-        const int parts = count(~on & (turned(on, 1) | turned(on, 2)) & four);
-        kinds[on] = {static_cast<std::uint8_t>(count(on)), parts == 1};
-    }
+    for (Ring on = 0; on < 256; ++on) kinds[on] = {static_cast<std::uint8_t>(count(on)), count(parts(on)) == 1};
     return kinds;
 }
 inline constexpr std::array<Kind, 256> kinds = list_kinds();
@@ -45,16 +55,26 @@ constexpr bool lies_beside_line(Ring on, int from) {
     return (ahead & 1) && (ahead & 0x06) && (ahead & 0xc0);
 }
 
-// Whether a candidate belongs to a clique of which a pixel must stay. `on` are the neighbours that are set,
+// The sides that are open and seen from which a pixel lies beside such a line: a bit each for east, north, west, south.
+constexpr std::array<std::uint8_t, 256> list_ways() {
+    std::array<std::uint8_t, 256> ways{};
+    for (Ring on = 0; on < 256; ++on)
+        for (const int from : {east, north, west, south})
+            if (!(on >> from & 1) && lies_beside_line(on, from)) ways[on] |= static_cast<std::uint8_t>(1 << from / 2);
+    return ways;
+}
+inline constexpr std::array<std::uint8_t, 256> ways = list_ways();
+
+// Not 0 where a candidate belongs to a clique of which a pixel must stay. `on` are the neighbours that are set,
 // `candidates` those of them that would go with it.
-constexpr bool is_crucial(Ring on, Ring candidates) {
+template <class R>
+RANGEEDGE_INLINE constexpr R crucial(R on, R candidates) {
     // A pair of 4-neighbours: what touches their common side must do so at one of its two ends.
-    const Ring left = turned(on, 1) | turned(on, 2), right = turned(on, 7) | turned(on, 6);
-    const Ring pairs = candidates & ~(left ^ right) & four;
+    const R left = turned(on, 1) | turned(on, 2), right = turned(on, 7) | turned(on, 6);
+    const R pairs = candidates & ~(left ^ right) & four;
     // A square of which two pixels across, three or all are set, none of them to stay.
-    const Ring stay = on & ~candidates;
-    const Ring squares =
-        (on | (turned(on, 1) & turned(on, 7))) & ~(stay | turned(stay, 1) | turned(stay, 7)) & diagonal;
+    const R stay = on & ~candidates;
+    const R squares = (on | (turned(on, 1) & turned(on, 7))) & ~(stay | turned(stay, 1) | turned(stay, 7)) & diagonal;
     return pairs | squares;
 }
 

@@ -102,7 +102,7 @@ SmearMask::SmearMask(int rows, int cols, const std::vector<std::int32_t>& found,
     }
 }
 
-void SmearMask::clear_of_candidates(std::vector<Candidate>& candidates) const {
+void SmearMask::clear_of_candidates(CandidateList& candidates) const {
     if (mask_.empty()) return;
     const auto smeared = [&](const Candidate& c) {
         if (c.kind & jump_bit) return !c.smeared && mask_[c.kind & occluding_bit ? c.before : c.after] == within;

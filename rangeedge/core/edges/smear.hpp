@@ -43,7 +43,7 @@ public:
 
     // Removes jumps whose nearer side is smeared, unless they are those of smeared steps, and creases of which a pixel
     // is smeared or beside one that is.
-    void clear_of_candidates(std::vector<Candidate>& candidates) const;
+    void clear_of_candidates(CandidateList& candidates) const;
     // 255 where a pixel is smeared; the output holds zeros before.
     void write(std::uint8_t* smeared) const;
 

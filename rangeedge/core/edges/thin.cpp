@@ -30,6 +30,7 @@
 
 #include "base/watch.hpp"
 #include "edges/ring.hpp"
+#include "edges/ring_rows.hpp"
 
 namespace rangeedge {
 namespace {
@@ -39,7 +40,7 @@ public:
     Thinner(const std::uint8_t* edges, const std::uint8_t* preferred, int rows, int cols)
         : rows_(rows), cols_(cols), stride_(cols + 2),
           offsets_{1, 1 - stride_, -stride_, -1 - stride_, -1, stride_ - 1, stride_, stride_ + 1},
-          state_(at(stride_) * at(rows + 2)), layer_(state_.size()) {
+          state_(at(stride_) * at(rows + 2) + at(StateMap::beyond)), layer_(state_.size()) {
         for (int y = 0; y < rows; ++y) {
             std::uint8_t* to = &state_[at(pixel(y, 0))];
             for (int x = 0; x < cols; ++x) to[x] = edges[x] ? on : 0;
@@ -51,55 +52,39 @@ public:
     }
 
     void peel() {
-        std::vector<int> border, next;
-        std::size_t enclosed = 0;  // pixels that have not been border yet
-        for_each_set([&](int p) {
-            if (is_border(p))
-                border.push_back(p);
-            else
-                ++enclosed;
-        });
-        while (!border.empty()) {
-            Watch::checkpoint();
-            layers_ = std::min(layers_ + 1, 255);
-            for (const int p : border) {
-                layer_[at(p)] = static_cast<std::uint8_t>(layers_);
-                const bool goes = kinds[ring<on>(p)].may_go() && !(state_[at(p)] & stays);
-                state_[at(p)] |= goes ? candidate : line;
-            }
-            next.clear();
-            for (const int p : border)
-                if (state_[at(p)] & candidate && is_crucial(ring<on>(p), ring<candidate>(p))) next.push_back(p);
-            for (const int p : next) state_[at(p)] = on | line;
-            next.clear();
-            for (const int p : border) {
-                if (state_[at(p)] & line)
-                    lines_.push_back(p);
-                else
-                    state_[at(p)] = 0;
-            }
-            for (const int p : border) {
-                if (is_set(p)) continue;
-                for (const int from : {east, north, west, south}) {
-                    const int q = p + offsets_[at(from)];
-                    if ((state_[at(q)] & (on | line | queued)) != on) continue;
-                    state_[at(q)] |= queued;
-                    next.push_back(q);
-                }
-            }
+        layers_ = 1;
+        const Border first = mark_border(map(), layers_, layer_.data());
+        mark_kept(map());
+        std::vector<int> border = list_marked(first.pixels), next;
+        std::size_t enclosed = first.enclosed;  // pixels that have not been border yet
+        while (true) {
+            settle(border, next);
             enclosed -= next.size();
             border.swap(next);
+            if (border.empty()) break;
+            Watch::checkpoint();
+            layers_ = std::min(layers_ + 1, 255);
+            if (border.size() > state_.size() / worth_all) {
+                mark_border(map(), layers_, layer_.data());
+                mark_kept(map());
+            } else {
+                mark(border);
+            }
         }
         by_depth_.resize(9u * at(layers_ + 1));
         if (enclosed == 0) return;
-        for_each_set([&](int p) {  // the pixels that lines enclose
-            if (state_[at(p)] & line) return;
+        for_each([&](int p) {  // the pixels that lines enclose
+            if ((state_[at(p)] & (on | line)) != on) return;
             layer_[at(p)] = static_cast<std::uint8_t>(layers_);
             lines_.push_back(p);
         });
     }
 
-    void narrow() { narrow(lines_); }
+    void narrow() {
+        ring_.resize(state_.size());
+        list_rings(map(), ring_.data());
+        narrow(lines_);
+    }
 
     void prune(int spur_length) {
         while (prune_once(spur_length)) {
@@ -122,17 +107,16 @@ public:
     }
 
 private:
-    // States of a pixel.
-    static constexpr std::uint8_t on = 1, line = 2, candidate = 4, queued = 8, stays = 16;
+    static constexpr std::size_t worth_all = 64;  // one pixel in so many at the border: all are looked at together
+    static constexpr std::uint8_t on = StateMap::on, line = StateMap::line, candidate = StateMap::candidate,
+                                  queued = StateMap::queued, stays = StateMap::stays, kept = StateMap::kept;
 
     static std::size_t at(int index) { return static_cast<std::size_t>(index); }
     int pixel(int y, int x) const { return (y + 1) * stride_ + x + 1; }
     int row(int p) const { return p / stride_; }
     int column(int p) const { return p % stride_; }
     bool is_set(int p) const { return state_[at(p)] & on; }
-    bool is_border(int p) const {
-        return !(state_[at(p + 1)] & state_[at(p - 1)] & state_[at(p + stride_)] & state_[at(p - stride_)] & on);
-    }
+    StateMap map() { return {state_.data(), pixel(0, 0), pixel(rows_, 0), stride_}; }
     // The neighbours of p that have the flag.
     template <std::uint8_t flag>
     Ring ring(int p) const {
@@ -140,22 +124,81 @@ private:
         for (int k = 0; k < 8; ++k) result |= static_cast<Ring>((state_[at(p + offsets_[at(k)])] & flag) / flag) << k;
         return result;
     }
-    int count_neighbours(int p) const { return kinds[ring<on>(p)].neighbours; }
+    // What follows holds once the rings are listed.
+    Kind kind(int p) const { return kinds[ring_[at(p)]]; }
+    int count_neighbours(int p) const { return kind(p).neighbours; }
+    void set(int p) {
+        state_[at(p)] = on | line;
+        for (int k = 0; k < 8; ++k) ring_[at(p + offsets_[at(k)])] |= static_cast<std::uint8_t>(1 << (k ^ 4));
+    }
+    void clear(int p) {
+        state_[at(p)] = 0;
+        for (int k = 0; k < 8; ++k) ring_[at(p + offsets_[at(k)])] &= static_cast<std::uint8_t>(~(1 << (k ^ 4)));
+    }
 
+    // The pixels that are candidates or lines, of which there are `count`.
+    std::vector<int> list_marked(std::size_t count) const {
+        std::vector<int> marked(count + 1);
+        std::size_t size = 0;
+        for_each([&](int p) {
+            marked[size] = p;
+            size += (state_[at(p)] & (candidate | line)) != 0;
+        });
+        marked.pop_back();
+        return marked;
+    }
+
+    // What mark_border and mark_kept do, for these pixels.
+    void mark(const std::vector<int>& border) {
+        for (const int p : border) {
+            layer_[at(p)] = static_cast<std::uint8_t>(layers_);
+            const bool goes = kinds[ring<on>(p)].may_go() && !(state_[at(p)] & stays);
+            state_[at(p)] |= goes ? candidate : line;
+        }
+        for (const int p : border)
+            if (state_[at(p)] & candidate && crucial(ring<on>(p), ring<candidate>(p))) state_[at(p)] |= kept;
+    }
+
+    // Of a round's border, what was kept becomes lines and the rest goes. `next` becomes the border of the next round.
+    void settle(const std::vector<int>& border, std::vector<int>& next) {
+        std::size_t count = lines_.size(), going = 0;
+        lines_.resize(count + border.size());
+        gone_.resize(border.size());
+        for (const int p : border) {
+            const bool remains = state_[at(p)] & (line | kept);
+            state_[at(p)] = remains ? on | line : 0;
+            lines_[count] = gone_[going] = p;
+            count += remains;
+            going += !remains;
+        }
+        lines_.resize(count);
+        next.resize(4 * going);
+        count = 0;
+        for (std::size_t k = 0; k < going; ++k)
+            for (const int from : {east, north, west, south}) {
+                const int q = next[count] = gone_[k] + offsets_[at(from)];
+                const bool opens = (state_[at(q)] & (on | line | queued)) == on;
+                state_[at(q)] |= opens ? queued : std::uint8_t{0};
+                count += opens;
+            }
+        next.resize(count);
+    }
+
+    // Visits all pixels that have a state, and some others.
     template <class F>
-    void for_each_set(F&& f) const {
-        const int end = static_cast<int>(state_.size());
+    void for_each(F&& f) const {
+        const int end = pixel(rows_, 0);
         std::uint64_t word;
         constexpr int step = sizeof word;
-        for (int p = 0; p < end; ++p) {
-            while (p + step <= end && (std::memcpy(&word, &state_[at(p)], sizeof word), !word)) p += step;
-            if (p < end && is_set(p)) f(p);
+        for (int p = 0; p < end; p += step) {
+            std::memcpy(&word, &state_[at(p)], sizeof word);
+            if (!word) continue;
+            for (int k = p; k < p + step; ++k) f(k);
         }
     }
     template <class F>
     void for_each_neighbour(int p, F&& f) const {
-        for (const int offset : offsets_)
-            if (is_set(p + offset)) f(p + offset);
+        for (Ring ring = ring_[at(p)]; ring; ring &= ring - 1) f(p + offsets_[at(__builtin_ctz(ring))]);
     }
 
     // How deep in its band a pixel lies: by layer, then by how many of its neighbours belong to a band.
@@ -165,36 +208,48 @@ private:
         return 9u * layer_[at(p)] + inside;
     }
 
+    // Those pixels that are wanted; no branch says which, as none could be predicted.
+    template <class F>
+    static void list(const std::vector<int>& pixels, std::vector<int>& wanted_ones, F&& wanted) {
+        wanted_ones.resize(pixels.size());
+        std::size_t count = 0;
+        for (const int p : pixels) {
+            wanted_ones[count] = p;
+            count += wanted(p) ? 1 : 0;
+        }
+        wanted_ones.resize(count);
+    }
+
     // Narrows the lines at the given pixels: first across, so that they keep their length, then all else that may go.
     void narrow(const std::vector<int>& pixels) {
-        narrow(pixels, lies_beside_line);
-        narrow(pixels, [](Ring, int) { return true; });
+        narrow(pixels, [](Ring around, int from) { return ways[around] >> (from / 2) & 1; });
+        narrow(pixels, [](Ring around, int from) { return ~around >> from & 1; });
     }
     template <class F>
     void narrow(const std::vector<int>& pixels, F&& from_here) {
         std::size_t least = by_depth_.size(), waiting = 0;
+        const auto may_go = [&](int p) { return is_set(p) & kind(p).may_go(); };
         const auto offer = [&](int p) {
-            if (!is_set(p) || !kinds[ring<on>(p)].may_go()) return;
+            if (!may_go(p)) return;
             const std::size_t d = depth(p);
             by_depth_[d].push_back(p);
             least = std::min(least, d);
             ++waiting;
         };
-        for (const int p : pixels) offer(p);
-        std::vector<int> group, side;
+        std::vector<int>&group = group_, &side = side_;
+        list(pixels, side, may_go);
+        for (const int p : side) offer(p);
         for (; waiting > 0; waiting -= group.size()) {
             checkpoints_.pass();
             while (by_depth_[least].empty()) ++least;
             group.clear();
             group.swap(by_depth_[least]);
             for (const int from : {south, north, east, west}) {
-                side.clear();
-                for (const int p : group)
-                    if (!is_set(p + offsets_[at(from)]) && from_here(ring<on>(p), from)) side.push_back(p);
+                list(group, side, [&](int p) { return from_here(ring_[at(p)], from); });
                 for (const int p : side) {
                     checkpoints_.pass();
-                    if (!is_set(p) || !kinds[ring<on>(p)].may_go()) continue;
-                    state_[at(p)] = 0;
+                    if (!may_go(p)) continue;
+                    clear(p);
                     for_each_neighbour(p, offer);
                 }
             }
@@ -216,8 +271,11 @@ private:
 
         int length() const { return static_cast<int>(pixels.size()); }
     };
-    Branch branch(int end, int limit) const {
-        Branch result{{end}, -1};
+    // It holds until the next one is asked for.
+    const Branch& branch(int end, int limit) {
+        Branch& result = branch_;
+        result.pixels.assign(1, end);
+        result.junction = -1;
         for (int before = -1, p = end; result.length() < limit;) {
             int next = -1;
             for_each_neighbour(p, [&](int q) { next = q == before ? next : q; });
@@ -260,15 +318,16 @@ private:
             const auto [length, sum, end] = spurs.top();
             spurs.pop();
             if (!is_set(end) || count_neighbours(end) != 1) continue;
-            const Branch spur = branch(end, limit);  // anew: its junction may have gone
+            const Branch& spur = branch(end, limit);  // anew: its junction may have gone
             if (spur.junction < 0) continue;
             if (protrusion(spur) != length) {
                 offer(end, spur);
                 continue;
             }
-            for (const int p : spur.pixels) state_[at(p)] = 0;
+            for (const int p : spur.pixels) clear(p);
             removed = true;
-            std::vector<int> near;
+            std::vector<int>& near = near_;
+            near.clear();
             for_each_neighbour(spur.pixels.back(), [&](int q) { near.push_back(q); });
             narrow(near);
             for (const int p : near) straighten(p);
@@ -284,13 +343,13 @@ private:
         const int middle = sum / 2, half = std::abs(first - middle);
         if (sum % 2 || (half != 1 && half != stride_) || is_set(middle)) return;
         if (layer_[at(middle)] == 0 || count_neighbours(middle) != 3) return;  // no band there, or another line
-        state_[at(p)] = 0;
-        state_[at(middle)] = on | line;
+        clear(p);
+        set(middle);
         lines_.push_back(middle);
     }
 
     void draw_end(int end, int spur_length) {
-        const Branch old = branch(end, spur_length + 4 * (layers_ + 2));
+        const Branch& old = branch(end, spur_length + 4 * (layers_ + 2));
         // The band is whole where no higher layer is near.
         int whole = 0;
         const auto layer = [&](int i) -> int { return layer_[at(old.pixels[at(i)])]; };
@@ -307,13 +366,13 @@ private:
         if (count + 1 >= old.length()) return false;
         const int first = old.pixels[at(count)];
         const int back = old.pixels[at(std::min(old.length() - 1, count + 2 * layer_[at(first)] + 3))];
-        for (int i = 0; i < count; ++i) state_[at(old.pixels[at(i)])] = 0;
-        const std::vector<int> drawn = draw(first, column(first) - column(back), row(first) - row(back));
+        for (int i = 0; i < count; ++i) clear(old.pixels[at(i)]);
+        const std::vector<int>& drawn = draw(first, column(first) - column(back), row(first) - row(back));
         const int length = static_cast<int>(drawn.size());
         const bool is_spur = old.junction >= 0 && old.length() - count + length < spur_length;
         if (length < least || is_spur) {
-            for (const int p : drawn) state_[at(p)] = 0;
-            for (int i = 0; i < count; ++i) state_[at(old.pixels[at(i)])] = on | line;
+            for (const int p : drawn) clear(p);
+            for (int i = 0; i < count; ++i) set(old.pixels[at(i)]);
             return false;
         }
         lines_.insert(lines_.end(), drawn.begin(), drawn.end());
@@ -322,8 +381,9 @@ private:
 
     // Draws a line from its end `first` in the direction (dx, dy), as far as the band reaches and without touching
     // another line.
-    std::vector<int> draw(int first, int dx, int dy) {
-        std::vector<int> drawn;
+    const std::vector<int>& draw(int first, int dx, int dy) {
+        std::vector<int>& drawn = drawn_;
+        drawn.clear();
         for (int p = first; p >= 0;) {
             int next = -1, least = 0;
             for (const int offset : offsets_) {
@@ -338,7 +398,7 @@ private:
                 least = off;
             }
             if (next >= 0) {
-                state_[at(next)] = on | line;
+                set(next);
                 drawn.push_back(next);
             }
             p = next;
@@ -350,10 +410,15 @@ private:
     int rows_, cols_, stride_;
     std::array<int, 8> offsets_;       // of the neighbours, as in a ring
     std::vector<std::uint8_t> state_;  // with a margin of one pixel, all 0
+    std::vector<std::uint8_t> ring_;   // of every pixel, from narrowing on
     std::vector<std::uint8_t> layer_;  // the round in which a pixel was border, 1 to 255; 0 outside the bands
     int layers_ = 0;
+    std::vector<int> gone_;                   // in a round
     std::vector<int> lines_;                  // every pixel of a line, and some that have gone
     std::vector<std::vector<int>> by_depth_;  // for `narrow`, empty between calls
+    // What functions fill, kept for their next call.
+    Branch branch_;
+    std::vector<int> group_, side_, near_, drawn_;
 };
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "base/simd.hpp"
+#include "image/hole.hpp"
 #include "noise/trimmed.hpp"
 
 namespace rangeedge {
@@ -28,6 +29,18 @@ std::vector<int> places_of(int size, int n) {
         if (2 * k < last) places.push_back(last - k);
     }
     return places;
+}
+
+// Interpolates the small holes of a line, as fits to it are made (scanline/bridge.hpp).
+template <class T>
+void bridge(T* y, int size) {
+    int last = -1;  // sample with data
+    for (int k = 0; k < size; ++k) {
+        if (!std::isfinite(y[k])) continue;
+        const Hole hole{last + 1, k};
+        if (last >= 0 && hole.size() > 0 && hole.size() <= most_bridged) interpolate(hole, y);
+        last = k;
+    }
 }
 
 double finite_deviation(std::vector<float>& sizes, bool by_median) {
@@ -67,8 +80,10 @@ DirectionSteps::DirectionSteps(const T* ordinate, int lines, int size, std::ptrd
         const T* first = ordinate + (group <= mirrored ? place(group) : room - place(mirrored)) * line_step;
         for (int k = 0; k < size; ++k)
             for (int i = 0; i < neighbours; ++i) samples[i * size + k] = first[i * line_step + k * sample_step];
-        for (int i = 0; i < neighbours; ++i)
+        for (int i = 0; i < neighbours; ++i) {
+            bridge(samples.data() + i * size, size);
             lines_[static_cast<std::size_t>(group * neighbours + i)].read(samples.data() + i * size, size);
+        }
     }
 }
 

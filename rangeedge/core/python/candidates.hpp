@@ -13,7 +13,7 @@ namespace rangeedge::python {
 using Columns = nb::typed<nb::dict, nb::str, nb::any>;
 
 // One array a field, by the field's name.
-inline Columns columns(const std::vector<Candidate>& candidates) {
+inline Columns columns(const CandidateList& candidates) {
     nb::dict result;
     const auto add = [&](const char* name, auto member) {
         using E = std::decay_t<decltype(candidates[0].*member)>;

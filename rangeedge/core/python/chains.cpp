@@ -14,7 +14,7 @@ namespace {
 
 // The candidates of a frame, for what comes after the map of lines is known.
 struct BoundCandidates {
-    std::vector<Candidate> all;
+    CandidateList all;
 };
 
 BoundCandidates keep_candidates(const BoundFrame& bound, const ScanLineOptions& options, int threads,

@@ -31,12 +31,12 @@ auto split_scan_line(const Values<T>& y, const Values<T>& x, double eps) {
     return handed_over<int>(std::move(segments));
 }
 
-std::vector<Candidate> candidates_of(const BoundFrame& bound, const ScanLineOptions& options, Team& team) {
+CandidateList candidates_of(const BoundFrame& bound, const ScanLineOptions& options, Team& team) {
     return std::visit([&](const auto& frame) { return find_candidates(frame, options, team); }, bound.frame);
 }
 
 Columns edge_candidates(const BoundFrame& bound, const ScanLineOptions& options, int threads) {
-    std::vector<Candidate> candidates;
+    CandidateList candidates;
     {
         const Unlock unlock;
         Team team = team_for(bound, threads);
@@ -48,10 +48,9 @@ Columns edge_candidates(const BoundFrame& bound, const ScanLineOptions& options,
 
 using Strengths = OutImage<float>;
 
-std::vector<Candidate> fill(const BoundFrame& bound, const ScanLineOptions& options, int threads,
-                            const EdgeMaps& maps) {
+CandidateList fill(const BoundFrame& bound, const ScanLineOptions& options, int threads, const EdgeMaps& maps) {
     Team team = team_for(bound, threads);
-    std::vector<Candidate> candidates = candidates_of(bound, options, team);
+    CandidateList candidates = candidates_of(bound, options, team);
     combine(candidates, maps, team);
     std::visit([&](const auto& frame) { mark_boundary(frame, boundary_bit, maps.kind, team); }, bound.frame);
     return candidates;
@@ -65,7 +64,7 @@ void edge_strength(const BoundFrame& frame, const ScanLineOptions& options, int 
 Columns edge_strength_and_candidates(const BoundFrame& frame, const ScanLineOptions& options, int threads,
                                      const Strengths& jump, const Strengths& crease, const OutImage<std::uint8_t>& kind,
                                      const Strengths& significance) {
-    std::vector<Candidate> candidates;
+    CandidateList candidates;
     {
         const Unlock unlock;
         candidates = fill(frame, options, threads, maps_of(jump, crease, kind, significance));

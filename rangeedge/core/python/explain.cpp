@@ -12,7 +12,7 @@ namespace rangeedge::python {
 namespace {
 
 nb::tuple kept_and_weak(const BoundFrame& bound, const ScanLineOptions& options, int threads) {
-    std::vector<Candidate> kept, weak;
+    CandidateList kept, weak;
     {
         const Unlock unlock;
         Team team = team_for(bound, threads);

@@ -332,7 +332,8 @@ int extract_seeds(const float* distance, const std::uint8_t* mask, int height, i
     const Array<int> summits = landscape.find_basins();
     const int count = summits.count();
     Array<float> share(count);
-    for (int i = 0; i < count; ++i) share[i] = separation * landscape[summits[i]];
+    // Zero times infinity is no share, where all is infinitely far and `separation` vanishes in single precision.
+    for (int i = 0; i < count; ++i) share[i] = separation > 0 ? separation * landscape[summits[i]] : 0;
 
     // Islands are known by the number of their highest summit.
     struct Join {
@@ -356,9 +357,7 @@ int extract_seeds(const float* distance, const std::uint8_t* mask, int height, i
     int found = 0;
     const auto found_peak = [&](int summit) {
         if (landscape[summits[summit]] < min_distance) return;
-        // Where all is infinitely far, or `separation` vanishes in single precision, nothing but no pixel is too low.
-        const float least = std::max(share[summit], std::numeric_limits<float>::denorm_min());
-        seeds[summit] = {++found, bits_of(least)};
+        seeds[summit] = {++found, bits_of(share[summit])};
     };
     for (int i = 0; i < count; ++i)
         if (islands.is_root(i)) found_peak(i);

@@ -76,7 +76,8 @@ struct Line {
     double start = 0, step = 1, per_step = 1;
     double direction[2] = {1, 0}, offset = 0;  // d and the distance along n in the plane of the image
     double kappa = 1;
-    bool curved = false;  // by `rays`, in the axes of the plane of the image and along the view
+    bool bridged = false;  // whether some samples without data are interpolated (bridge.hpp)
+    bool curved = false;   // by `rays`, in the axes of the plane of the image and along the view
     Rays rays{};
 
     double abscissa(int k) const { return x ? static_cast<double>(x[k]) : k; }
@@ -89,6 +90,15 @@ struct Line {
     }
     double depth(double ordinate, double abscissa) const {
         return frame->projective ? stretch(abscissa) / ordinate : -ordinate;
+    }
+    // Whether sample k is of the image.
+    bool has_data(int k) const {
+        return !bridged || frame->valid_at(path.col + k * path.dcol, path.row + k * path.drow);
+    }
+    // The pixel of the first sample that is, from sample k in steps of `by`.
+    std::int64_t pixel_with_data(int k, int by) const {
+        while (!has_data(k)) k += by;
+        return pixel(k);
     }
     std::int64_t pixel(int k) const { return path.pixel(k, frame->cols); }
     // The noise of sample k, of the border between two samples, and of a segment.

@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <limits>
 
 #include "base/simd.hpp"
+#include "scanline/bridge.hpp"
 
 namespace rangeedge {
 namespace {
@@ -100,6 +102,7 @@ void LineReader<T>::read(int direction, int first, int count, Strip<T>& strip) c
         set_tolerance(line, strip.scale.data() + used);
         used += static_cast<std::size_t>(line.path.size);
     }
+    bridge(strip);
 }
 
 // Rows lie in the image as they are; the last ones are copied, since nothing may be read beyond the image.
@@ -110,9 +113,37 @@ void LineReader<T>::take_rows(Strip<T>& strip) const {
     T* copy = strip.y.data();
     for (Line<T>& line : strip.lines) {
         line.y = frame_.ordinate + line.path.pixel(0, frame_.cols);
-        if (static_cast<std::int64_t>(frame_.rows - 1 - line.path.row) * frame_.cols >= padding) continue;
-        line.y = std::copy_n(line.y, frame_.cols, copy) - frame_.cols;
+        if (static_cast<std::int64_t>(frame_.rows - 1 - line.path.row) * frame_.cols < padding)
+            line.y = std::copy_n(line.y, frame_.cols, copy) - frame_.cols;
         copy += pitch;
+    }
+}
+
+// Rows that lie in the image are copied first.
+template <class T>
+void LineReader<T>::bridge(Strip<T>& strip) const {
+    const int most = std::min(most_bridged, options_.max_gap);
+    Array<Hole> holes;
+    for (std::size_t j = 0; j < strip.lines.size(); ++j) {
+        Line<T>& line = strip.lines[j];
+        find_bridged(line, most, holes);
+        line.bridged = !holes.empty();
+        if (!line.bridged) continue;
+        const auto within = [&](const std::vector<T>& of, const T* values) {
+            return !of.empty() && std::less_equal<>()(of.data(), values) &&
+                   std::less<>()(values, of.data() + of.size());
+        };
+        T* y = strip.y.data() + j * static_cast<std::size_t>(frame_.cols + padding);
+        if (within(strip.y, line.y))
+            y = strip.y.data() + (line.y - strip.y.data());
+        else
+            std::copy_n(line.y, line.path.size, y);
+        line.y = y;
+        for (const Hole& hole : holes) {
+            interpolate(hole, y);
+            if (line.x) interpolate(hole, strip.x.data() + (line.x - strip.x.data()));
+            if (line.scale) interpolate(hole, strip.scale.data() + (line.scale - strip.scale.data()));
+        }
     }
 }
 

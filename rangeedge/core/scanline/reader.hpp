@@ -26,6 +26,7 @@ private:
     void read_points(Line<T>& line, T* x, T* y) const;
     void read_curved(Line<T>& line, T* x, T* y) const;
     void set_tolerance(Line<T>& line, T* scale) const;
+    void bridge(Strip<T>& strip) const;
 
     const Frame<T>& frame_;
     const ScanLineOptions& options_;

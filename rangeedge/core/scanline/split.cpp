@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 #include "base/simd.hpp"
@@ -161,12 +162,13 @@ RANGEEDGE_INLINE std::ptrdiff_t find_worst_of_even_in(const Samples<T>* lines, c
 RANGEEDGE_FIND_WORST(float)
 RANGEEDGE_FIND_WORST(double)
 
-// The sample behind which a segment is cut at an extreme one: that joins the neighbour it is closer to, of equally
-// close ones the one farther from the middle.
+// The sample behind which a segment is cut at an extreme one: that joins the neighbour it is closer to, of two that are
+// equally close, but for rounding, the one farther from the middle.
 template <class T>
 int cut_at(const T* y, const Segment& s, int k) {
     const T left = std::abs(y[k] - y[k - 1]), right = std::abs(y[k + 1] - y[k]);
-    const bool joins_left = left < right || (left == right && 2 * k < s.first + s.last);
+    const T rounding = 4 * std::numeric_limits<T>::epsilon() * std::abs(y[k]);
+    const bool joins_left = left < right - rounding || (left <= right + rounding && 2 * k < s.first + s.last);
     return joins_left ? k : k - 1;
 }
 

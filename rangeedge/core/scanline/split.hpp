@@ -5,9 +5,9 @@
 //
 // The paper leaves open to which part the sample of the largest residual belongs. Here a cut falls between two samples:
 // this one goes with the neighbour whose value is closer, since on a jump one of the two lies on the other surface. A
-// line is also cut where samples have no data. No rule prefers a side, so that a mirrored line is cut at the same
-// places. Instead of by recursion the segments of one generation, of all lines of
-// a strip, are split in turn, so that a processor works on several at a time; the result is the same.
+// line is also cut where samples have no data, but for small holes (bridge.hpp). No rule prefers a side, so that a
+// mirrored line is cut at the same places. Instead of by recursion the segments of one generation, of all lines of a
+// strip, are split in turn, so that a processor works on several at a time; the result is the same.
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cmath>
