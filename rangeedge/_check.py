@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import cv2
 import numpy as np
 
+from . import _core
+
 if TYPE_CHECKING:
     from .io.camera import Camera
 
 # Kernels count in 32 bits what a pixel may have four of: edge points, one a direction of scan lines, and borders.
 PIXEL_LIMIT = 2**29
 
+_call = _core.Call()
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
@@ -56,7 +59,7 @@ def named(name: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
         @functools.wraps(function)
         def call(*args: _P.args, **kwargs: _P.kwargs) -> _R:
             # Values may be so large or so small that they overflow: what comes of it counts as invalid, in silence.
-            with np.errstate(all="ignore"):
+            with np.errstate(all="ignore"), _call:
                 try:
                     return function(*args, **kwargs)
                 except error as problem:
@@ -104,40 +107,44 @@ def array(name: str, value: Any, expected: str, ndim: Collection[int] = (2,)) ->
 
 
 def image8(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
-    """An 8-bit (or bool) single-channel image as C-contiguous uint8; values are kept."""
+    """An 8-bit (or bool) single-channel image as C-contiguous uint8; values are kept.
+
+    A copy, as all images are that kernels read more than once and trust: another thread may be writing to the original.
+    """
     expected = "an 8-bit or bool array of shape (H, W)" if shape is None else f"an 8-bit or bool array of shape {shape}"
     value = array(name, value, expected)
     if value.dtype not in (np.uint8, np.bool_):
         raise fail(name, expected, described(value), cv2.Error.StsUnsupportedFormat)
     if shape is not None and value.shape != shape:
         raise fail(name, expected, described(value), cv2.Error.StsUnmatchedSizes)
-    return np.ascontiguousarray(value).view(np.uint8)
+    return np.array(value, order="C").view(np.uint8)
 
 
 def image32f(name: str, value: Any, shape: tuple[int, int] | None = None) -> np.ndarray:
-    """A real single-channel image as C-contiguous, aligned float32; 8-bit and float64 are converted."""
+    """A real single-channel image as C-contiguous, aligned float32, a copy; 8-bit and float64 are converted."""
     expected = "a real array of shape (H, W)" if shape is None else f"a real array of shape {shape}"
     value = array(name, value, expected)
     if shape is not None and value.shape != shape:
         raise fail(name, expected, described(value), cv2.Error.StsUnmatchedSizes)
     with np.errstate(over="ignore"):
-        return np.require(value, np.float32, ["C", "A"])
+        return np.array(value, np.float32, order="C")
 
 
 def labels32s(name: str, value: Any, shape: tuple[int, int] | None = None, *, listed: bool = False) -> np.ndarray:
-    """A label image as C-contiguous, aligned int32; with `listed`, there is room for a table with a row a label."""
+    """A label image as C-contiguous, aligned int32, a copy; with `listed`, a table with a row a label has room."""
     expected = "an int32 array of shape (H, W)" if shape is None else f"an int32 array of shape {shape}"
     value = array(name, value, expected)
     if value.dtype != np.int32:
         raise fail(name, expected, described(value), cv2.Error.StsUnsupportedFormat)
     if shape is not None and value.shape != shape:
         raise fail(name, expected, described(value), cv2.Error.StsUnmatchedSizes)
+    value = np.array(value, order="C")
     most = max(value.size, 2**16 - 1)
     if listed and value.max() > most:
         raise fail(
             name, f"{expected}, labels of up to {most}", f"labels of up to {value.max()}", cv2.Error.StsOutOfRange
         )
-    return np.require(value, requirements=["C", "A"])
+    return value
 
 
 def number(name: str, value: Any, low: float = -np.inf, high: float = np.inf, *, above: bool = False) -> float:
@@ -160,6 +167,14 @@ def real(value: float | np.integer | np.floating) -> float:
         return float(value)
     except OverflowError:
         return np.inf if value > 0 else -np.inf
+
+
+def reals(value: Any) -> np.ndarray:
+    """Numbers, nested as they may be, in double precision; a TypeError or ValueError where there are others."""
+    array = np.array(value)
+    if array.dtype.kind not in "buifO" or isinstance(value, np.ma.MaskedArray):
+        raise TypeError(f"{array.dtype} is no real number")
+    return array.astype(np.float64)
 
 
 def integer(name: str, value: Any, low: int, high: int = 2**31 - 1) -> int:
@@ -212,7 +227,7 @@ def distortion(name: str, value: Any) -> np.ndarray:
     """Coefficients of distortion as float64, as many as cv2 knows."""
     expected = "4, 5, 8, 12 or 14 finite numbers"
     try:
-        coefficients = np.array(value, dtype=np.float64).ravel()
+        coefficients = reals(value).ravel()
     except (TypeError, ValueError, OverflowError):
         raise fail(name, expected, described(value)) from None
     if len(coefficients) not in (4, 5, 8, 12, 14) or not np.isfinite(coefficients).all():

@@ -9,6 +9,7 @@ import numpy as np
 
 from ._check import integer, labels32s
 from ._option import parsed, takes
+from .bands import by_bands
 from .constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
 from .contacts import Borders, borders_of, lengths
 from .frame import Frame
@@ -233,7 +234,7 @@ def _seen(frame: Frame, corners: np.ndarray, nearest: np.ndarray, gap: int) -> n
 
 def _neighbours(frame: Frame, labels: np.ndarray, gap: int, minContacts: int) -> tuple[np.ndarray, Borders, np.ndarray]:
     """The pairs of `regionAdjacency`, the borders of which they are, and the surfaces of all regions."""
-    labels = np.where(frame.valid > 0, np.maximum(labels, 0), 0)
+    labels = by_bands(lambda own, valid: np.where(valid > 0, np.maximum(own, 0), 0), labels, frame.valid)
     surfaces = surfaces_of(frame, without_rims(labels), int(labels.max()) + 1)
     borders = borders_of(frame, labels, surfaces, gap, minContacts)
     pairs = np.zeros(len(borders), PAIR)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import cv2
 import numpy as np
 
+from .cancellation import apart
 from .distance import distanceTransformWithLabels
 from .pixels import all_around, beside, components, pixels_of
 
@@ -35,7 +38,8 @@ def _chains(edges: np.ndarray, wrap: bool) -> np.ndarray:
     """The skeleton of a map, cut at its junctions; what is nothing but junction stays whole."""
     from skimage.morphology import skeletonize
 
-    skeleton = all_around(edges, skeletonize) if wrap else skeletonize(edges)
+    thin = partial(apart, edges.size, skeletonize)
+    skeleton = all_around(edges, thin) if wrap else thin(edges)
     junctions = beside((_branches(skeleton, wrap) > 2).view(np.uint8), wrap)
     # A branch of a junction touches its neighbours diagonally: one pixel more has to go.
     cut = skeleton & ~cv2.dilate(junctions, np.ones((3, 3), np.uint8))[1:-1, 1:-1].view(bool)

@@ -234,7 +234,7 @@ def _said(why: Explanation) -> Iterator[str]:
         others = f" {why.others} other edge pixels come or go with that." if why.others else ""
         yield f"  With {options} it is {'none' if why.edge else 'one'}.{others}"
     elif why.obstacle:
-        yield f"  No change of options was found that makes it {'none' if why.edge else 'one'}. Next: {why.obstacle}"
+        yield f"  No change of options was found that makes it {'none' if why.edge else 'one'}. {why.obstacle}"
     for found in why.nearest:
         yield f"  {_beside(found, unit)}"
     for line in why.lines:

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import _core
 from ._check import described, error, fail, image8
+from .bands import bands, by_bands
 from .forms import SRC, range_array
 from .noise_model import WHITE, NoiseModel
 from .options import ScanLineParams
@@ -80,40 +81,52 @@ class Frame:
         """Inverse depth or height of every pixel, NaN where invalid."""
         if self.samples.ndim == 2:
             return self.samples
+        return by_bands(self._ordinate_of, self.samples)
+
+    def _ordinate_of(self, points: np.ndarray) -> np.ndarray:
         if self.ranges:
-            return 1 / np.linalg.norm(self.samples, axis=2)
-        along = self.samples @ np.asarray(self.axis, self.samples.dtype)
+            return 1 / np.linalg.norm(points, axis=2)
+        along = points @ np.asarray(self.axis, points.dtype)
         if not self.projective:
             return -along
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(along > 0, 1 / along, np.nan).astype(self.samples.dtype)
+            return np.where(along > 0, 1 / along, np.nan).astype(points.dtype)
 
     @cached_property
     def valid(self) -> np.ndarray:
         """uint8, 1 where a pixel has data."""
-        return np.isfinite(self.ordinate).view(np.uint8)
+        return by_bands(np.isfinite, self.ordinate).view(np.uint8)
 
     @cached_property
     def depth(self) -> np.ndarray:
         """Distance along the viewing axis, NaN where invalid."""
-        return 1 / self.ordinate if self.projective else -self.ordinate
+        return by_bands(lambda own: 1 / own if self.projective else -own, self.ordinate)
 
     @cached_property
     def points(self) -> np.ndarray:
         """(H, W, 3) coordinates of every pixel, NaN where invalid."""
         if self.samples.ndim == 3:
-            return self.samples + np.asarray(self.origin, np.float64)
-        v, u = np.indices(self.shape, sparse=True)
+            return by_bands(lambda own: own + np.asarray(self.origin, np.float64), self.samples)
+        return by_bands(self._points_of, self.rows, self.ordinate)
+
+    def _points_of(self, v: np.ndarray, ordinate: np.ndarray) -> np.ndarray:
+        x, y = self.places(v)
+        if not self.projective:
+            return np.stack([x, y, ordinate if self.heightMap else -ordinate], axis=-1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            z = 1 / ordinate.astype(np.float64)
+        return np.stack([x * z, y * z, z], axis=-1)
+
+    @property
+    def rows(self) -> np.ndarray:
+        """The number of every row, (H, 1)."""
+        return np.arange(self.shape[0])[:, None]
+
+    def places(self, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The coordinates x and y of the pixels of some `rows` on the plane of the image."""
+        u = np.arange(self.shape[1])
         a, b, c, d, e, f = self.to_plane
-        points = np.empty((*self.shape, 3))
-        points[..., 0], points[..., 1] = a * u + b * v + c, d * u + e * v + f
-        if self.projective:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                points[..., 2] = 1 / self.ordinate.astype(np.float64)
-            points[..., :2] *= points[..., 2:]
-        else:
-            points[..., 2] = self.ordinate if self.heightMap else -self.ordinate
-        return points
+        return a * u + b * v + c, d * u + e * v + f
 
     def toward_viewer(self, points: np.ndarray) -> np.ndarray:
         """The directions toward the viewer from points (..., 3)."""
@@ -174,12 +187,10 @@ def read_frame(src: np.ndarray, params: ScanLineParams, mask: np.ndarray | None 
     if mask is not None:
         inside = image8("mask", mask, src.shape[:2]) != 0
         seen = inside if seen is None else seen & inside
-    _core.checkpoint()
     if params.invalid is not None:
         found = _holds(src, params.invalid)
         if found.any():
             seen = ~found if seen is None else seen & ~found
-    _core.checkpoint()
     if src.ndim == 3:
         return _points(src, seen, params)
     if params.K is not None:
@@ -263,16 +274,15 @@ def _pinhole(src: np.ndarray, seen: np.ndarray | None, params: ScanLineParams) -
     _core.invert_depth(depth, factor, None if seen is None else seen.view(np.uint8), inverse)
     if params.distCoeffs is None or not params.distCoeffs.any():
         return Frame(inverse, True, tuple(np.linalg.inv(K)[:2].ravel().tolist()), step=_step(src, factor))
-    rays = distorted_rays(K, params.distCoeffs, depth.shape).astype(inverse.dtype)
-    return Frame(rays / inverse[..., None], True, curved=True, step=_step(src, factor))
+    rays = distorted_rays(K, params.distCoeffs, depth.shape)
+    points = by_bands(lambda ray, q: ray.astype(inverse.dtype) / q[..., None], rays, inverse)
+    return Frame(points, True, curved=True, step=_step(src, factor))
 
 
 def _grid(src: np.ndarray, seen: np.ndarray | None, params: ScanLineParams) -> Frame:
     heightMap, pixelSize = params.heightMap, params.pixelSize
     values = _lengths(src, params.depthFactor, heightMap)
-    _core.checkpoint()
     height = values if heightMap else -values
-    _core.checkpoint()
     infinite = np.isinf(height)
     if infinite.any():
         height = np.where(infinite, height.dtype.type(np.nan), height)
@@ -286,23 +296,36 @@ def _grid(src: np.ndarray, seen: np.ndarray | None, params: ScanLineParams) -> F
 
 def _points(src: np.ndarray, seen: np.ndarray | None, params: ScanLineParams) -> Frame:
     dtype = np.float64 if src.dtype.itemsize > 4 else np.float32
-    points = np.array(src[..., :3], dtype=dtype, order="C")
-    # Three zeros are what cameras write where they see nothing.
-    points[~np.isfinite(points).all(axis=2) | (points == 0).all(axis=2)] = np.nan
-    if seen is not None:
-        points[~seen] = np.nan
+
+    def kept(src: np.ndarray, seen: np.ndarray | None) -> np.ndarray:
+        points = np.array(src[..., :3], dtype=dtype, order="C")
+        # Three zeros are what cameras write where they see nothing.
+        points[~np.isfinite(points).all(axis=2) | (points == 0).all(axis=2)] = np.nan
+        if seen is not None:
+            points[~seen] = np.nan
+        return points
+
+    points = by_bands(kept, src, seen)
     if params.heightMap:
         return Frame(points, False, axis=(0.0, 0.0, -1.0), heightMap=True)
     view = view_of(points, params.origin)
     if any(view.origin):
-        points = (src[..., :3] - np.asarray(view.origin)).astype(dtype) * np.where(np.isnan(points), np.nan, 1)
-        points = np.ascontiguousarray(points, dtype)
+
+        def moved(src: np.ndarray, points: np.ndarray) -> np.ndarray:
+            relative = (src[..., :3] - np.asarray(view.origin)).astype(dtype)
+            return np.ascontiguousarray(relative * np.where(np.isnan(points), np.nan, 1), dtype)
+
+        points = by_bands(moved, src, points)
     if not view.projective:
         return Frame(points, False)
     if view.ranges:
         return Frame(points, True, axis=view.axis, curved=True, ranges=True, origin=view.origin)
-    count = np.count_nonzero(np.isfinite(points[..., 0]))
-    with np.errstate(invalid="ignore"):
-        points[~(points @ np.asarray(view.axis, dtype) > 0)] = np.nan
-    warn_of_dropped(count, np.count_nonzero(np.isfinite(points[..., 0])))
+    given = kept_points = 0
+    for rows in bands(points):
+        own = points[rows]
+        given += np.count_nonzero(np.isfinite(own[..., 0]))
+        with np.errstate(invalid="ignore"):
+            own[~(own @ np.asarray(view.axis, dtype) > 0)] = np.nan
+        kept_points += np.count_nonzero(np.isfinite(own[..., 0]))
+    warn_of_dropped(given, kept_points)
     return Frame(points, True, axis=view.axis, origin=view.origin)

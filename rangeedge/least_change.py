@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,15 +38,14 @@ class Trials:
     def __init__(self, case: Case, selection: Selection) -> None:
         self.case, self.given = case, selection
         self.base = {**vars(case.params), **vars(case.selection)}
-        self.base["jumpThreshold"] = self.base["jumpThreshold"] or 0.0
+        largest = 2 * float(case.strength.jump.max(initial=0)) / case.selection.hysteresis
+        self.base["jumpThreshold"] = min(self.base["jumpThreshold"] or 0.0, largest)  # inf, or as good as that
+        self.base["creaseThreshold"] = min(self.base["creaseThreshold"], _ANGLES / case.selection.hysteresis)
         self._latest: tuple[ScanLineParams, EdgeStrength] = case.params, case.strength
 
     def options(self, change: Change) -> tuple[ScanLineParams, Selection]:
-        params, selection = (
-            type(own)(**{**vars(own), **{name: value for name, value in change.items() if name in own.options}})
-            for own in (self.case.params, self.given)
-        )
-        return params, selection
+        own = [{n: value for n, value in change.items() if n in kind.options} for kind in (ScanLineParams, Selection)]
+        return replace(self.case.params, **own[0]), replace(self.given, **own[1])
 
     def strength(self, params: ScanLineParams) -> EdgeStrength:
         if params == self.case.params:
@@ -97,7 +97,10 @@ def _followed(trials: Trials, change: dict[str, Any]) -> tuple[dict[str, Any], s
         if case.edge != trials.case.edge:
             return change, ""
         verdict = case.verdict(case.lines(1))
-        reason = "" if verdict.stage == "no cut" else verdict.reason
+        given = ", ".join(
+            f"{name}={value if isinstance(value, int) else f'{value:.4g}'}" for name, value in change.items()
+        )
+        reason = "" if verdict.stage == "no cut" else f"With {given}: {verdict.reason}"
         more = next(iter(verdict.changes), {})
         if all(change.get(name) == value for name, value in more.items()):
             break

@@ -7,10 +7,12 @@ from collections.abc import Callable
 import cv2
 import numpy as np
 
+from .cancellation import apart
+
 
 def components(mask: np.ndarray, wrap: bool) -> tuple[int, np.ndarray]:
     """The 8-connected components of a bool map: a number above all labels, and labels, 0 outside."""
-    count, labels = cv2.connectedComponents(mask.view(np.uint8))
+    count, labels = apart(mask.size, cv2.connectedComponents, mask.view(np.uint8))
     if not wrap:
         return count, labels
     around = beside(labels, wrap)

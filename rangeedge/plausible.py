@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from . import _core
 from ._check import error
 from .options import ScanLineParams, Selection
 
@@ -77,7 +76,6 @@ def question_geometry(src: np.ndarray, frame: Frame, params: ScanLineParams) -> 
         _refuse_zeros(src)
     if params.invalid is None and src.ndim == 2:
         _warn_of_outlier(src, frame)
-    _core.checkpoint()
     _warn_of_form(src, frame, plain)
     if params.K is not None and src.size >= _LEAST_IMAGE:
         _warn_of_camera(params.K, src.shape)
@@ -89,7 +87,6 @@ def _refuse_zeros(src: np.ndarray) -> None:
     """Ask what the zeros of a plain image of float depths are."""
     if src.dtype.kind != "f" or src.size < _LEAST_IMAGE:
         return
-    _core.checkpoint()
     zeros = np.count_nonzero(src == 0)
     if zeros < _SEVERAL or np.nanmin(src) < 0:
         return
@@ -107,7 +104,6 @@ def _warn_of_outlier(src: np.ndarray, frame: Frame) -> None:
     if src.size < _LEAST_IMAGE or not len(coarse):
         return
     for bound in (np.fmin, np.fmax):  # of ordinates, which are NaN where invalid, and grow or fall with the values
-        _core.checkpoint()
         value = src.flat[np.argmax(frame.ordinate == bound.reduce(frame.ordinate, axis=None))]
         others = coarse[coarse != value].astype(np.float64)
         if not len(others):

@@ -9,6 +9,7 @@ import numpy as np
 
 from ._check import array, fail
 from ._option import parsed, takes
+from .bands import bands, by_bands
 from .frame import Frame, read_frame
 from .options import GEOMETRY, ScanLineParams
 
@@ -64,23 +65,22 @@ def backproject(src: np.ndarray, *, mask: np.ndarray | None = None, **options: U
     frame = read_frame(src, params, mask)
     if params.K is None or (src.dtype.kind == "f" and src.dtype.itemsize > 4):
         return _without_invalid(frame)
-    # Not by way of the inverse, which float32 would round.
-    depth = np.divide(src, params.depthFactor if src.dtype.kind in "iu" else 1.0, dtype=np.float64)
-    depth[frame.valid == 0] = np.nan
-    return _rays(frame) * depth[..., None]
+    factor = params.depthFactor if src.dtype.kind in "iu" else 1.0
+
+    def points(v: np.ndarray, src: np.ndarray, valid: np.ndarray) -> np.ndarray:
+        # Not by way of the inverse, which float32 would round.
+        depth = np.divide(src, factor, dtype=np.float64)
+        depth[valid == 0] = np.nan
+        return np.stack([*frame.places(v), np.ones(depth.shape)], axis=-1) * depth[..., None]
+
+    return by_bands(points, frame.rows, src, frame.valid)
 
 
 def _without_invalid(frame: Frame) -> np.ndarray:
     points = frame.points
-    points[frame.valid == 0] = np.nan
+    for rows in bands(points):
+        points[rows][frame.valid[rows] == 0] = np.nan
     return points
-
-
-def _rays(frame: Frame) -> np.ndarray:
-    """(H, W, 3) places on the plane z = 1."""
-    v, u = np.indices(frame.shape)
-    a, b, c, d, e, f = frame.to_plane
-    return np.stack([a * u + b * v + c, d * u + e * v + f, np.ones(frame.shape)], axis=-1)
 
 
 @takes(GEOMETRY)
@@ -125,7 +125,9 @@ def project(points: np.ndarray, **options: Unpack[GeometryOptions]) -> np.ndarra
     if points.shape[-1] != 3:
         raise fail("points", expected, f"one of shape {points.shape}")
     (params,) = parsed(options, ScanLineParams)
-    return to_pixels(points.astype(np.float64), read_frame(_ONE_PIXEL, replace(params, imageSize=None)))
+    frame = read_frame(_ONE_PIXEL, replace(params, imageSize=None))
+    rows = points.reshape(-1, 3)
+    return by_bands(lambda own: to_pixels(own.astype(np.float64), frame), rows).reshape(points.shape)
 
 
 def to_pixels(points: np.ndarray, frame: Frame) -> np.ndarray:

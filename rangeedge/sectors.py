@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from .bands import by_bands, chosen
 from .viewpoint import mean_ray, unit_rays
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ class Sector(NamedTuple):
 
 def turn_of(samples: np.ndarray) -> Turn | None:
     """How far points look around, where their rays are too far apart for one axis."""
-    rays = unit_rays(samples.astype(np.float64))
+    rays = by_bands(lambda own: unit_rays(own.astype(np.float64)), samples)
     steps = [_steps(rays, axis) for axis in (0, 1)]
     axis = int(steps[1].sum() > steps[0].sum())
     extent = float(steps[axis].sum())
@@ -133,7 +134,7 @@ def _divided(frame: Frame, turn: Turn) -> Iterator[Sector]:
         lines = lines % count if closed else lines[(lines >= 0) & (lines < count)]
         samples = np.take(frame.samples, lines, axis)
         noise = np.take(frame.noise, lines, axis) if isinstance(frame.noise, np.ndarray) else frame.noise
-        seen = samples[np.isfinite(samples[..., 0])].astype(np.float64)
-        part = replace(frame, samples=samples, noise=noise, axis=mean_ray(seen) if len(seen) else frame.axis)
+        seen = [own.astype(np.float64) for own in chosen(samples, np.isfinite(samples[..., 0])) if len(own)]
+        part = replace(frame, samples=samples, noise=noise, axis=mean_ray(seen) if seen else frame.axis)
         first = margin if closed else start - int(lines[0])
         yield Sector(part, axis, first, first + stop - start, start)

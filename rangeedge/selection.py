@@ -311,7 +311,6 @@ def select_maps(
         return edges
 
     edges = reaching(*thresholds)
-    _core.checkpoint()
     if hysteresis < 1:
         edges = _connected_to(edges, reaching(*low), wrap)
     least = selection.of().lineSignificance

@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 
 from . import _core
+from .bands import bands, by_bands, counts, quantiles
 from .frame import Frame
 
 SURFACE = np.dtype([("curved", np.bool_), ("centroid", "3f8"), ("normal", "3f8"), ("quadric", "10f8"), ("rms", "f8")])
@@ -34,11 +35,21 @@ def surface_map(frame: Frame, edges: np.ndarray | None) -> _core.RangeMap:
 def relative_ordinate(frame: Frame) -> tuple[np.ndarray, float, float]:
     """Ordinates of which planes are affine functions, less an offset, in single precision; the offset, its rounding."""
     ordinate = _along_axis(frame)
-    seen = ordinate[np.isfinite(ordinate)]
-    offset = float(seen[:: max(1, len(seen) // 4096)].mean(dtype=np.float64)) if len(seen) else 0.0
+    offset = _middle(ordinate)
     with np.errstate(invalid="ignore", over="ignore"):  # signalling NaN; beyond single precision
-        relative = (ordinate - ordinate.dtype.type(offset)).astype(np.float32, copy=False)
+        relative = by_bands(lambda own: (own - own.dtype.type(offset)).astype(np.float32, copy=False), ordinate)
     return relative, offset, float(np.spacing(np.abs(ordinate.dtype.type(offset))))
+
+
+def _middle(ordinate: np.ndarray) -> float:
+    """The mean of some 4096 ordinates, 0 where there is none."""
+    step = max(1, np.count_nonzero(np.isfinite(ordinate)) // 4096)
+    count, some = 0, []
+    for rows in bands(ordinate):
+        seen = ordinate[rows][np.isfinite(ordinate[rows])]
+        some.append(seen[-count % step :: step])
+        count += len(seen)
+    return float(np.concatenate(some).mean(dtype=np.float64)) if count else 0.0
 
 
 def _along_axis(frame: Frame) -> np.ndarray:
@@ -56,16 +67,33 @@ def places(frame: Frame) -> tuple[np.ndarray | None, np.ndarray | None, tuple[fl
     if frame.samples.ndim == 2:
         return None, None, frame.to_plane
     right, down, axis = _plane_axes(frame)
-    points = frame.samples.astype(np.float64)
-    x, y = points @ right, points @ down
-    if frame.projective:
-        with np.errstate(divide="ignore", invalid="ignore"):
-            x, y = x / (points @ axis), y / (points @ axis)
-    steps = np.concatenate([np.hypot(np.diff(x, axis=k), np.diff(y, axis=k)).ravel() for k in (0, 1)])
-    steps = steps[steps > 0]  # and so not NaN
-    spacing = float(np.median(steps)) if len(steps) else 1.0
-    to_plane = (spacing, 0.0, 0.0, 0.0, spacing, 0.0)
-    return (x / spacing).astype(np.float32), (y / spacing).astype(np.float32), to_plane
+
+    def place(points: np.ndarray) -> np.ndarray:
+        points = points.astype(np.float64)
+        x, y = points @ right, points @ down
+        if frame.projective:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                x, y = x / (points @ axis), y / (points @ axis)
+        return np.stack([x, y], axis=1)
+
+    xy = by_bands(place, frame.samples)
+    spacing = _spacing(xy)
+    x, y = (by_bands(lambda own, k=k: (own[:, k] / spacing).astype(np.float32), xy) for k in (0, 1))
+    return x, y, (spacing, 0.0, 0.0, 0.0, spacing, 0.0)
+
+
+def _spacing(xy: np.ndarray) -> float:
+    """The median step between neighbours in rows and columns of (H, 2, W) places, 1 where there is none."""
+    height, _, width = xy.shape
+    steps = np.empty((2, height, width))  # no number where there is none or it is 0
+    for rows in bands(steps[0]):
+        steps[:, rows] = np.nan
+        for axis, own in ((0, xy[rows.start : rows.stop + 1]), (2, xy[rows])):
+            step = np.hypot(*np.moveaxis(np.diff(own, axis=axis), 1, 0))
+            into = steps[axis // 2, rows.start : rows.start + step.shape[0], : step.shape[1]]
+            into[...] = np.where(step > 0, step, np.nan)
+    (spacing,) = quantiles(steps, 0.5)
+    return 1.0 if np.isnan(spacing) else spacing
 
 
 def _plane_axes(frame: Frame) -> np.ndarray:
@@ -95,7 +123,7 @@ def surfaces_of(frame: Frame, labels: np.ndarray, count: int) -> np.ndarray:
     points = frame.points
     origins, scales = np.zeros((count, 3)), np.ones(count)
     moments, curved = np.zeros((count, len(_EXPONENTS))), np.zeros(count, np.uint8)
-    ordinate = frame.ordinate.astype(np.float64, copy=False)
+    ordinate = by_bands(lambda own: own.astype(np.float64), frame.ordinate)
     _core.region_moments(labels, points, ordinate, frame.threads, origins, scales, moments, curved)
     # Planes and quadrics in (p - origin) / scale, as coefficients of _TERMS and 1, with a gradient of about 1.
     mean, normal, rms = _planes(moments)
@@ -128,12 +156,17 @@ def without_rims(labels: np.ndarray) -> np.ndarray:
 
     An edge is rounded off by what a sensor averages over. Planes fitted to that, too, meet at flatter angles.
     """
-    names = np.where(labels > 0, labels, -1).astype(np.float64)  # of any number, which singles do not tell apart
     window = np.ones((2 * _RIM + 1,) * 2, np.uint8)
-    inner = np.where(cv2.erode(names, window) == cv2.dilate(names, window), labels, 0)
-    before, after = np.bincount(labels.ravel()), np.bincount(inner.ravel(), minlength=int(labels.max()) + 1)
+
+    def inside(labels: np.ndarray) -> np.ndarray:
+        names = np.where(labels > 0, labels, -1).astype(np.float64)  # of any number, which singles do not tell apart
+        return np.where(cv2.erode(names, window) == cv2.dilate(names, window), labels, 0)
+
+    inner = by_bands(inside, labels, halo=_RIM)
+    count = int(labels.max()) + 1
+    before, after = counts(labels, count), counts(inner, count)
     whole = after < np.maximum(_LEAST_CURVED, _LEAST_INNER * before)
-    return np.where(whole[labels], labels, inner).astype(labels.dtype, copy=False)
+    return by_bands(lambda all_of, own: np.where(whole[all_of], all_of, own).astype(labels.dtype), labels, inner)
 
 
 def _planes(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ._check import array, described, fail, number, public
+from ._check import array, described, fail, number, public, reals
 from .forms import range_array
 
 
@@ -71,7 +71,7 @@ def _angles(name: str, value: object, line: tuple[int, int], shape: tuple[int, i
     """Radians, one a row or column or one a pixel."""
     expected = f"{max(line)} finite angles in degrees, or an array of shape {shape}"
     try:
-        angles = np.asarray(value, dtype=np.float64)
+        angles = reals(value)
     except (TypeError, ValueError, OverflowError):
         raise fail(name, expected, described(value)) from None
     if angles.shape == (max(line),):

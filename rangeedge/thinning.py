@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from . import _check, _core
+from .cancellation import apart
 from .constants import THIN_ITERATIVE, THIN_LEE, THIN_MEDIAL, THIN_SKELETON
 from .pixels import all_around
 
@@ -106,9 +107,8 @@ def _skeleton(edges: np.ndarray, method: int) -> np.ndarray:
     if width:
         box = np.s_[y : y + height, x : x + width]
         if method == THIN_ITERATIVE:
-            skeleton[box] = morphology.thin(edges[box] != 0)
+            skeleton[box] = apart(edges.size, morphology.thin, edges[box] != 0)
         else:
-            skeleton[box] = (
-                morphology.skeletonize(edges[box] != 0, method="lee" if method == THIN_LEE else "zhang") != 0
-            )
+            kind = "lee" if method == THIN_LEE else "zhang"
+            skeleton[box] = apart(edges.size, morphology.skeletonize, edges[box] != 0, method=kind) != 0
     return skeleton

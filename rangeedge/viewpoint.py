@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from ._check import error
+from .bands import bands
 from .resection import resect
 
 Point = tuple[float, float, float]
@@ -94,23 +95,35 @@ def _view_from(points: np.ndarray, origin: Point, lines: _Lines) -> View:
 
 def _plane_view(points: np.ndarray, origin: Point | None) -> View:
     origin = origin or (0.0, 0.0, 0.0)
-    seen = points[np.isfinite(points[..., 2])].astype(np.float64) - np.asarray(origin)
-    if not len(seen):
+    nearest = min((own[:, 2].min() for own in _seen(points, origin)), default=None)
+    if nearest is None:
         return View(False)
-    if seen[:, 2].min() > 0:
+    if nearest > 0:
         return View(True, origin)
-    return View(True, origin, mean_ray(seen))
+    return View(True, origin, mean_ray(_seen(points, origin)))
 
 
 def _turning_view(points: np.ndarray, origin: Point | None) -> View:
     origin = origin or (0.0, 0.0, 0.0)
-    seen = points[np.isfinite(points[..., 2])].astype(np.float64) - np.asarray(origin)
-    return View(True, origin, mean_ray(seen), ranges=True)
+    return View(True, origin, mean_ray(_seen(points, origin)), ranges=True)
 
 
-def mean_ray(points: np.ndarray) -> Point:
-    """The mean of the rays; the z axis where they go everywhere."""
-    axis = unit_rays(points).mean(axis=0)
+def _seen(points: np.ndarray, origin: Point) -> Iterator[np.ndarray]:
+    """The points there are from the viewpoint, some at a time."""
+    for rows in bands(points):
+        own = points[rows]
+        own = own[np.isfinite(own[..., 2])].astype(np.float64) - np.asarray(origin)
+        if len(own):
+            yield own
+
+
+def mean_ray(parts: Iterable[np.ndarray]) -> Point:
+    """The mean of the rays of points (N, 3), which come in parts; the z axis where they go everywhere."""
+    total, count = np.zeros((1, 3)), 0
+    for points in parts:
+        total = np.concatenate([total, unit_rays(points)]).sum(axis=0, keepdims=True)  # one after the other
+        count += len(points)
+    axis = total[0] / max(count, 1)
     length = np.linalg.norm(axis)
     return tuple((axis / length).tolist()) if length > 0.1 else (0.0, 0.0, 1.0)
 

@@ -141,9 +141,8 @@ def drawing(src, geometry, faces, axes, dimensions):
     for number, face in enumerate(faces, 1):
         labels[face.inside] = number
     picture = cv2.resize(rangeedge.drawRegions(labels, src, 0.5, **geometry), None, fx=2, fy=2)
-    corners = np.array(
-        list(product(*(dimension.ends for dimension in dimensions)))
-    )  # their numbers in binary: which ends
+    # Corners are numbered in binary: of the low or the high end of each dimension.
+    corners = np.array(list(product(*(dimension.ends for dimension in dimensions))))
     places = 2 * rangeedge.project(corners @ axes, **geometry)[:, :2] + 0.5
     for first, last in combinations(range(8), 2):
         if bin(first ^ last).count("1") != 1:
@@ -153,11 +152,9 @@ def drawing(src, geometry, faces, axes, dimensions):
     # At the edges that meet in the corner nearest to the viewer: high ends, where planes of faces are.
     for k, dimension in enumerate(dimensions):
         x, y = (places[7] + places[7 - (4 >> k)]) / 2
-        text = f"{dimension.length:.3f}"
+        text, place = f"{dimension.length:.3f} +- {dimension.deviation:.3f}", (int(x) + 4, int(y) - 4)
         for colour, width in (((0, 0, 0), 3), (INK, 1)):
-            cv2.putText(
-                picture, text, (int(x) + 4, int(y) - 4), cv2.FONT_HERSHEY_SIMPLEX, 0.6, colour, width, cv2.LINE_AA
-            )
+            cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.5, colour, width, cv2.LINE_AA)
     return picture
 
 

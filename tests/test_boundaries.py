@@ -230,6 +230,17 @@ def test_planes_of_grids_meet_in_their_line(heightMap):
         assert np.allclose(outline["point"][:, 2], expected, atol=0.001)
 
 
+def test_vertices_of_a_curved_region_lie_on_its_quadratic():
+    def height(x, y):
+        return 0.02 * x**2 + 0.03 * y**2 - 0.015 * x * y
+
+    y, x = np.mgrid[:40, :50].astype(float)
+    labels = (np.hypot(x - 20, y - 18) < 15).astype(np.int32)
+    (region,) = regionBoundaries(labels, height(x, y), pixelSize=1.0, heightMap=True)
+    points = region.outline["point"]
+    assert np.allclose(points[:, 2], height(points[:, 0], points[:, 1]), atol=1e-3)
+
+
 def test_points_have_outlines_on_their_surfaces():
     x, y = np.meshgrid(0.1 * np.arange(40.0), 0.2 * np.arange(30.0))
     labels = np.where(x < 2, 1, 2).astype(np.int32)

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
-from test_inputs import INPUTS, chunk, pcd, ply, text, tiff
+from test_inputs import INPUTS, XYZ, chunk, pcd, ply, text, tiff
 from test_scanner_files import perceptron_header
 
 import rangeedge
@@ -172,6 +172,16 @@ def test_bombs_are_refused(tmp_path, make, what):
     with pytest.raises(rangeedge.error, match=what):
         imreadRange(path)
     assert time.perf_counter() - start < SLOW
+
+
+@pytest.mark.parametrize("length", ["1.5", "-1", "nan", "inf"])
+def test_lists_have_whole_lengths(tmp_path, length):
+    path = tmp_path / "grid.ply"
+    lists = text("1 2 3", "4 5 6", "1 0", f"{length} 1")
+    header = ("obj_info num_cols 2", "obj_info num_rows 1", "element vertex 2", *XYZ, "element range_grid 2", GRID[1])
+    path.write_bytes(ply(*header, body=lists, encoding="ascii"))
+    with pytest.raises(rangeedge.error, match="list of length"):
+        imreadRange(path)
 
 
 def test_what_packs_well_is_no_bomb(tmp_path):

@@ -2,6 +2,7 @@
 
 import _thread
 import functools
+import importlib
 import json
 import os
 import signal
@@ -16,11 +17,9 @@ import numpy as np
 import pytest
 
 import rangeedge
+from rangeedge import _check, evaluation
 from rangeedge.batch import runBatch
-from rangeedge.frame import read_frame
-from rangeedge.options import ScanLineParams, Selection
-from rangeedge.plausible import question_geometry
-from rangeedge.selection import select_maps, select_strength
+from rangeedge.cancellation import apart
 
 SOON = 0.2  # seconds
 TRIES = 3  # of which the quickest counts, as other programs may run
@@ -247,21 +246,123 @@ def test_a_batch_that_is_given_up_goes_on_where_it_stopped(tmp_path):
     assert states == ["skipped", "written", "written", "written"]
 
 
-def test_what_is_no_kernel_is_given_up_as_well():
-    """Checks and selections by NumPy ask, too, between their steps."""
-    z, cancellation = noise(100), rangeedge.Cancellation()
-    frame = read_frame(z, ScanLineParams())
-    strength = rangeedge.edgeStrength(z, noise=0.1)
-    cancellation.cancel()
+def cancelling(function, cancellation, reached):
+    """The function, during which another thread gives up the call."""
+
+    def call(*args, **options):
+        thread = threading.Thread(target=cancellation.cancel)
+        thread.start()
+        thread.join()
+        reached.append("after")
+        return function(*args, **options)
+
+    return call
+
+
+@pytest.mark.parametrize(
+    ("module", "step", "call"),
+    [
+        ("rangeedge.frame", "checked", lambda: rangeedge.backproject(noise(100))),
+        ("rangeedge.draw.relief", "subdued", lambda: rangeedge.drawEdges(noise(100), np.zeros((100, 100), np.uint8))),
+        ("rangeedge.evaluation.edges", "_skeleton", None),
+        ("rangeedge.io.files", "as_range_image", None),
+    ],
+)
+def test_what_is_no_kernel_is_given_up_as_well(module, step, call, monkeypatch, tmp_path):
+    """Between two steps of Python, also within what catches other exceptions."""
+    owner, cancellation, reached = importlib.import_module(module), rangeedge.Cancellation(), []
+    if step == "as_range_image":
+        path = tmp_path / "image.npy"
+        np.save(path, noise(10))
+        call = functools.partial(rangeedge.imreadRange, path)
+    elif call is None:
+        edges = (noise(100) > 1.2).astype(np.uint8)
+        call = functools.partial(evaluation.evaluateEdges, edges, edges)
+    monkeypatch.setattr(owner, step, cancelling(getattr(owner, step), cancellation, reached))
+    with cancellation, pytest.raises(CancelledError, match="given up") as raised:
+        call()
+    assert not reached
+    assert raised.value.__suppress_context__
+    call()  # outside the block
+    assert reached
+
+
+def test_calls_within_calls_end_together(monkeypatch):
+    """The outer call as well as the inner one, and no exception comes after them."""
+    cancellation, reached = rangeedge.Cancellation(), []
+    outer = _check.named("outer")(lambda: reached.append(rangeedge.kindNames(cancel())))
+    cancel = cancelling(lambda: 1, cancellation, [])
     with cancellation:
-        for call in (
-            lambda: read_frame(z, ScanLineParams(invalid=0)),
-            lambda: question_geometry(z, frame, ScanLineParams()),
-            lambda: select_strength(strength, Selection()),
-            lambda: select_maps(strength.jump, strength.crease, strength.kind, None, Selection(minLength=1)),
-        ):
-            with pytest.raises(CancelledError):
-                call()
+        with pytest.raises(CancelledError):
+            outer()
+        assert not reached
+        for _ in range(1000):  # a step that could be given up
+            pass
+        with pytest.raises(CancelledError):
+            rangeedge.kindNames(1)
+    outer()
+    assert reached == ["jump"]
+
+
+def test_only_calls_are_given_up():
+    """What stands between them in the block goes on."""
+    cancellation, done = rangeedge.Cancellation(), 0
+    with cancellation:
+        cancelling(lambda: None, cancellation, [])()
+        for _ in range(1000):
+            done += 1
+    assert done == 1000
+
+
+def test_calls_are_given_up_while_others_come_and_go():
+    """No exception reaches another call, another thread, or what is between calls."""
+    ends, strange = {"whole": 0, "given up": 0}, []
+
+    def work(seed):
+        try:
+            for k in range(200):
+                cancellation = rangeedge.Cancellation()
+                timer = threading.Timer(1e-4 * ((seed + k) % 7), cancellation.cancel)
+                timer.start()
+                try:
+                    with cancellation:
+                        rangeedge.colorizeDistance(np.ones((64, 64)))
+                    ends["whole"] += 1
+                except CancelledError:
+                    ends["given up"] += 1
+                timer.join()
+                assert rangeedge.kindNames(1) == "jump"
+        except BaseException as problem:
+            strange.append(problem)
+
+    threads = [threading.Thread(target=work, args=(seed,)) for seed in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not strange
+    assert min(ends.values()) > 10
+
+
+def test_a_step_of_another_library_is_left_to_its_thread():
+    started, go_on, ended, cancellation = (*(threading.Event() for _ in range(3)), rangeedge.Cancellation())
+
+    def step():
+        started.set()
+        go_on.wait(10)
+        ended.set()
+
+    call = _check.named("call")(lambda: apart(1 << 30, step))
+    threading.Thread(target=lambda: (started.wait(10), cancellation.cancel())).start()
+    with cancellation, pytest.raises(CancelledError):
+        call()
+    assert not ended.is_set()
+    go_on.set()
+    assert ended.wait(10)
+    for pixels in (1, 1 << 30):
+        assert apart(pixels, divmod, 7, 2) == (3, 1)
+        with pytest.raises(ZeroDivisionError):
+            apart(pixels, divmod, 7, 0)
 
 
 @pytest.mark.parametrize("wait", [0.02, 0.1])
@@ -317,3 +418,24 @@ for _ in range(20):
     assert os.waitpid(child, 0)[1] == 0
 """
     subprocess.run([sys.executable, "-W", "ignore", "-c", program], check=True, timeout=60)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="there are no such signals")
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_interrupted_batch_ends_and_leaves_nothing(tmp_path, jobs):
+    for k in range(4):
+        np.save(tmp_path / f"{k}.npy", noise(1200))
+    command = [sys.executable, "-m", "rangeedge", "batch", str(tmp_path), "--out", str(tmp_path / "out")]
+    command += ["--pixel-size", "1", "--noise", "1e-4", "--jobs", str(jobs)]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as run:
+        manifest = tmp_path / "out" / "manifest.jsonl"
+        while not manifest.exists() and run.poll() is None:
+            time.sleep(0.05)
+        time.sleep(0.7)
+        run.send_signal(signal.SIGINT)
+        began = time.monotonic()
+        said = run.communicate()[1]
+        assert run.returncode == 130, said
+        assert time.monotonic() - began < 25 * SOON  # the end of Python takes a while, too
+    assert not list(tmp_path.rglob("*.tmp"))

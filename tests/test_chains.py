@@ -195,6 +195,17 @@ def test_gaps_are_not_bridged_between_edges_that_do_not_continue_each_other():
     assert len(tall) == 2
 
 
+@pytest.mark.parametrize("row", [40.0, 60.0, 71.0])
+def test_a_rim_that_is_straight_in_the_image_ends_where_it_bends_in_depth(row):
+    y, x = np.mgrid[:120, :80]
+    depth = np.where(x < 40, 5 + 0.3 * np.abs(y - row), 30.0)
+    depth += np.random.default_rng(0).normal(0, 0.001, depth.shape)
+    rim = [chain for chain in linkEdges(depth, pixelSize=1, noise=0.001) if chain.kind == EDGE_JUMP]
+    upper, lower = sorted(rim, key=lambda chain: chain.points["y"].mean())
+    assert abs(upper.points["y"].max() - row) < 1.5
+    assert abs(lower.points["y"].min() - row) < 1.5
+
+
 def test_a_jump_ends_where_its_nearer_side_changes():
     y, x = np.mgrid[:60, :80]
     depth = np.where((x < 40) == (y < 30), 3.0, 4.0)

@@ -506,7 +506,7 @@ def test_lines_writes_chains_and_segments(image, tmp_path, capsys):
     assert report["noise"]["a"] == pytest.approx(estimateNoise(imreadRange(image).src, K=K).a)
     assert len((out / "chains.csv").read_text().splitlines()) == 1 + len(chains.points)
     picture = cv2.imread(str(out / "lines.png"))
-    assert picture.shape[1] == 1200
+    assert 1200 < picture.shape[1] < 1240  # with its axis
     assert picture.shape[0] >= 900 + 2 * 28  # a title above, the key below
     assert {(0, 94, 213), (66, 228, 240), (233, 180, 86)} <= set(map(tuple, picture[-20, :400].tolist()))
 

@@ -15,9 +15,10 @@ from rangeedge.constants import (
 )
 from rangeedge.draw import colorizeDistance, drawEdges, drawOverview, drawRegions
 from rangeedge.draw.lines import write_lengths
-from rangeedge.draw.overview import _beside_small_holes
+from rangeedge.draw.overview import _beside_small_holes, _depth_caption, edge_overview
 from rangeedge.draw.regions import _middles, write_numbers
 from rangeedge.draw.sheet import _step, with_axes
+from rangeedge.frame import read_frame
 from rangeedge.segments import SEGMENT, VERTEX
 
 VERMILION, PURPLE, YELLOW, BLUE, GREY, WHITE = (
@@ -417,3 +418,26 @@ def test_rims_of_small_holes_are_no_kinds_of_candidates():
     small = _beside_small_holes(valid)
     assert small[4:7, 4:7].all()
     assert not small[19:24, 19:24].any()
+
+
+@pytest.mark.parametrize(
+    ("values", "options", "caption"),
+    [
+        (np.uint16([[1500, 2000, 0]] * 3), {}, "Depth 1.5 to 2 m, near bright, 67 % valid"),
+        (np.uint16([[5000, 7500, 0]] * 3), {"depthFactor": 5000.0}, "Depth 1 to 1.5 units, near bright, 67 % valid"),
+        (np.array([[1.5, 2.0]] * 3), {"heightMap": True}, "Height 1.5 to 2 units, high bright, 100 % valid"),
+        (np.full((3, 3), np.nan), {}, "Depth: no data"),
+    ],
+)
+def test_units_are_those_of_the_user(values, options, caption):
+    frame = read_frame(values, rangeedge.ScanLineParams(**options))
+    assert _depth_caption(frame) == caption
+
+
+def test_overview_of_a_command_is_that_of_the_function():
+    depth = np.where(np.arange(64) < 30, 1500, 2000).astype(np.uint16) * np.ones((48, 1), np.uint16)
+    edges, strength = rangeedge.detectEdgesWithStrength(depth, K=K)
+    distance = rangeedge.distanceTransform(edges)
+    frame = read_frame(depth, rangeedge.ScanLineParams(K=K))
+    shown = edge_overview(frame, strength, edges, distance, "a title")
+    assert np.array_equal(shown, drawOverview(depth, strength, edges, distance, title="a title", K=K))

@@ -351,6 +351,14 @@ def test_regions_by_hand(labels, expected):
     assert dataclasses.asdict(scores) == full
 
 
+def test_of_two_roles_with_one_measure_a_region_has_the_first():
+    # Correct with the mean of 27 / 48 and 1, over-segmented with that of 30 / 48 and 30 / 32.
+    truth = np.repeat([1, 0], [48, 2])[None]
+    labels = np.repeat([1, 0, 2], [27, 18, 5])[None]
+    scores = hooverScores(labels, truth, T=0.55)
+    assert (scores.correct, scores.over, scores.noise) == (1, 0, 1)
+
+
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.int32, np.int64, np.uint16])
 def test_numbering_and_type_of_labels_do_not_matter(dtype):
     labels, truth = random_regions(np.random.default_rng(4))

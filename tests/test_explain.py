@@ -8,11 +8,14 @@ import numpy as np
 import pytest
 
 import rangeedge
-from rangeedge import NoiseModel, detectEdges, drawExplanation, explainPixel
+from rangeedge import EDGE_CONVEX, NoiseModel, detectEdges, drawExplanation, explainPixel
 from rangeedge.app.cli import main
 from rangeedge.draw.explanation import _ticks
-from rangeedge.options import DETECTION
+from rangeedge.edges import EdgeStrength
+from rangeedge.frame import read_frame
+from rangeedge.options import DETECTION, ScanLineParams, Selection
 from rangeedge.synthetic import box, pinholeCamera, plane, renderScene
+from rangeedge.verdict import Case
 
 CAMERA = pinholeCamera(np.array([[80.0, 0, 39.5], [0, 80.0, 29.5], [0, 0, 1]]), (80, 60))
 K = CAMERA.geometry["K"]
@@ -80,7 +83,7 @@ def test_agrees_with_the_map(name):
     src, options = CASES[name]
     edges = detectEdges(src, **options)
     explained = changed = 0
-    for x, y in near_edges(edges, 7):
+    for x, y in near_edges(edges, 11):
         why = explainPixel(src, int(x), int(y), **options)
         assert why.edge == (edges[y, x] > 0)
         assert why.edge == (why.stage == "edge")
@@ -98,7 +101,7 @@ def test_agrees_with_the_map(name):
         else:
             rows, cols = np.nonzero(edges)
             assert np.hypot(rows - y, cols - x).min() > 24
-    assert changed >= 0.9 * explained > 5
+    assert changed >= 0.9 * explained > 3
 
 
 ROOF = 0.06 * np.abs(np.arange(80) - 40.3) * np.ones((60, 1)) + np.random.default_rng(0).normal(0, 0.02, (60, 80))
@@ -129,7 +132,7 @@ def test_of_an_edge_that_an_option_suppresses_the_option_is_named(name):
         options = {**known, **strict}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", rangeedge.RangeEdgeWarning)
-            gone = np.argwhere((edges > 0) & (detectEdges(src, **options) == 0))[::17]
+            gone = np.argwhere((edges > 0) & (detectEdges(src, **options) == 0))[::23]
             found = [explainPixel(src, int(x), int(y), **options) for y, x in gone]
         for why in found:
             count[bool(why.change)] += 1
@@ -147,6 +150,15 @@ def test_change_is_a_round_number_that_hardly_exceeds_what_is_needed():
     assert explainPixel(step, 19, 15, noise=0.001).change == {"jumpThreshold": 0.25}
     assert explainPixel(roof, 30, 20, noise=0.001).change == {"creaseThreshold": 22.0}
     assert explainPixel(roof, 30, 20, creaseThreshold=60.0, noise=0.001).change == {"creaseThreshold": 20.0}
+
+
+def test_thresholds_that_switch_a_kind_off_have_a_change_too():
+    step = np.where(np.arange(40) < 20, 1.0, 1.2468) * np.ones((30, 1))
+    roof = 0.2 * np.abs(np.arange(64) - 30.3) * np.ones((48, 1))  # 22.62 degrees
+    off = explainPixel(step, 19, 15, np.inf, noise=0.001).change["jumpThreshold"]
+    assert 0.22 <= off <= 0.2468
+    off = explainPixel(roof, 30, 20, creaseThreshold=np.inf, noise=0.001).change["creaseThreshold"]
+    assert 10 <= off <= 22.62
 
 
 def test_of_several_options_that_drop_a_line_the_one_is_named_that_changes_the_fewest_others():
@@ -238,11 +250,35 @@ def test_every_stage_by_hand():
     assert lost.change["minSignificance"] < lost.value
 
 
+def test_a_stray_crease_needs_the_fourth_strongest_around_it():
+    params = ScanLineParams(pixelSize=1)
+    frame = read_frame(np.ones((9, 9)), params).with_noise(0.01)
+    crease = np.zeros((9, 9), np.float32)
+    crease[[4, 3, 5, 4, 4], [4, 4, 4, 5, 3]] = 40, 35, 27.25, 25.5, 20
+    kind = np.where(crease > 0, EDGE_CONVEX, 0).astype(np.uint8)
+    strength = EdgeStrength(np.zeros_like(crease), crease, kind, np.full_like(crease, 50))
+    verdict = Case(frame, strength, params, Selection(), 4, 4).verdict(())
+    assert (verdict.stage, verdict.value, verdict.limit) == ("stray", 2, 4)
+    assert verdict.changes[0]["creaseThreshold"] == pytest.approx(25.5, rel=0.01)
+
+
 def test_faint_crease_names_its_significance():
     rng = np.random.default_rng(0)
     roof = 0.02 * np.abs(np.arange(64) - 30.0) * np.ones((48, 1)) + rng.normal(0, 0.05, (48, 64))
     stages = {explainPixel(roof, x, 24, noise=0.05).stage for x in range(26, 36)}
     assert "edge" not in stages
+
+
+def test_what_is_still_in_the_way_is_said():
+    """A line that minLength drops, beside which the pixel lies: without that option it is selected, and thinned."""
+    roof = 0.5 * np.abs(np.arange(64) - 30.4) * np.ones((48, 1))
+    strength = rangeedge.edgeStrength(roof, noise=0.001)
+    thin = detectEdges(roof, noise=0.001)
+    y, x = np.argwhere((strength.crease > 30) & (thin == 0))[20]
+    why = explainPixel(roof, int(x), int(y), noise=0.001, minLength=60)
+    assert (why.stage, why.change) == ("line", {})
+    assert why.obstacle.startswith("With minLength=48: It is selected, but edges are one pixel wide")
+    assert f"No change of options was found that makes it one. {why.obstacle}" in str(why)
 
 
 def test_panorama():

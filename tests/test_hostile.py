@@ -79,6 +79,22 @@ def test_errors_whose_squares_are_beyond_double_precision():
     assert (statistics.mean, statistics.largest, statistics.over) == (1e300, 1e300, 1.0)
 
 
+COMPLEX = np.array([1 + 2j] * 6)
+
+
+@pytest.mark.parametrize("values", [COMPLEX, COMPLEX.real.astype("m8[s]"), COMPLEX.real.astype(str), np.ma.ones(6)])
+def test_numbers_that_are_not_real(values):
+    for call in (
+        lambda: rangeedge.edgeStrength(DEPTH, K=values[:4]),
+        lambda: rangeedge.edgeStrength(DEPTH, K=(1, 1, 1, 1), distCoeffs=values[:4]),
+        lambda: rangeedge.writeLines("x.geojson", rangeedge.linkEdges(DEPTH), values),
+        lambda: rangeedge.sweepToPoints(DEPTH[:6, :6], values, np.arange(6.0)),
+        lambda: synthetic.sphere(values[:3], 1),
+    ):
+        with pytest.raises(rangeedge.error, match="must be"):
+            call()
+
+
 def test_planes_that_are_parallel_have_no_edge():
     flat = np.array([[0.0, 0, 1]])
     assert np.isnan(optimality.measureDetector(flat, flat, 90.0, size=20, seed=7)).all()
@@ -131,6 +147,39 @@ def test_saliences_that_change_meanwhile(method):
                 rangeedge.salienceDistanceTransform(salience, method)
             except rangeedge.error:
                 salience[:] = 0.5
+    finally:
+        stop.set()
+        writer.join()
+
+
+V, U = np.mgrid[:200, :300]
+BLOCKS = 1 + U // 30 + 10 * (V // 20)
+CHANGING = {
+    "labels": (BLOCKS.astype(np.int32), lambda labels: rangeedge.regionBoundaries(labels)),
+    "distance": (np.hypot(U % 30 - 15, V % 20 - 10).astype(np.float32), lambda d: rangeedge.extractSeedsWithStats(d)),
+    "mask": (np.ones(U.shape, np.uint8), lambda mask: rangeedge.extractSeeds(np.hypot(U % 30, V % 20), mask=mask)),
+}
+
+
+@pytest.mark.parametrize("name", CHANGING)
+def test_images_that_change_meanwhile(name):
+    """What a kernel reads twice, and uses as an index, is a copy."""
+    original, call = CHANGING[name]
+    image, rng, stop = original.copy(), np.random.default_rng(0), threading.Event()
+
+    def write():
+        extreme = np.iinfo(image.dtype).max if image.dtype == np.int32 else 1e9 if image.dtype == np.float32 else 0
+        while not stop.is_set():
+            where = rng.integers(0, image.size, 2000)
+            image.flat[where] = extreme if rng.random() < 0.5 else 0
+            image.flat[where] = original.flat[where]
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        for _ in range(40):
+            with contextlib.suppress(rangeedge.error):
+                call(image)
     finally:
         stop.set()
         writer.join()

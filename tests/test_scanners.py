@@ -8,6 +8,7 @@ import rangeedge
 from rangeedge import detectEdges, edgePoints, edgeStrength, segmentRegions
 from rangeedge.frame import read_frame
 from rangeedge.options import ScanLineParams
+from rangeedge.panorama import _reversed
 from rangeedge.viewpoint import View, distorted_rays, mean_ray, view_of
 
 WALLS = ((0, 5.0), (0, -4.0), (1, 3.5), (1, -4.5), (2, -1.2), (2, 1.8))  # axis, place
@@ -432,6 +433,15 @@ def test_chains_all_around(columns, noise):
     segments, _ = rangeedge.fitSegments(chains, tolerance=0.05)
     for length, number in ((9.0, 2), (8.0, 2), (3.0, 4)):  # of the floor, and between floor and ceiling
         assert (np.abs(segments["length"] - length) < 0.05).sum() >= number
+
+
+def test_a_chain_the_other_way_round_has_its_sides_exchanged():
+    points = np.zeros(3, [("x", "f8"), ("normals", "f8", (2, 3))])
+    points["x"], points["normals"][:, 0], points["normals"][:, 1] = (1, 2, 3), (1, 0, 0), (0, 1, 0)
+    turned = _reversed(points)
+    assert turned["x"].tolist() == [3, 2, 1]
+    assert (turned["normals"] == [(0, 1, 0), (1, 0, 0)]).all()
+    assert (points["normals"][:, 0] == (1, 0, 0)).all()
 
 
 def test_a_jump_all_around_is_one_chain():

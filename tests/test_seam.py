@@ -152,6 +152,15 @@ def test_distances_turn_with_the_image():
         np.testing.assert_allclose(turned(salienceDistanceTransform(salience, wrap=True), columns), there, rtol=1e-6)
 
 
+def test_ways_around_barriers_turn_with_the_image():
+    for edges, columns, rng in maps():
+        walls = (rng.random(edges.shape) < 0.2).astype(np.uint8)
+        here = turned(distanceTransform(edges, barrier=walls, wrap=True), columns)
+        there = distanceTransform(turned(edges, columns), barrier=turned(walls, columns), wrap=True)
+        np.testing.assert_allclose(here, there, rtol=0.08)  # by so much a way may be longer than the shortest
+        np.testing.assert_array_less(distanceTransform(turned(edges, columns), wrap=True) * (1 - 1e-6), there + 1e-30)
+
+
 @pytest.mark.parametrize(
     "call",
     [

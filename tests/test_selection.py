@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import rangeedge
+from rangeedge import EDGE_CONVEX, EdgeStrength
 from rangeedge.selection import overallStrength, selectEdges, strengthImage
 
 INF = np.inf
@@ -343,3 +344,13 @@ def test_few_chains_have_no_statistics_to_speak_of(chains, kept):
     edges = selectEdges(strength, zeros(strength), 0, dynamic=True)
     assert (edges[strength > 0] > 0).all() == kept
     assert edges.any() == kept
+
+
+@pytest.mark.parametrize("density", [0.1, 0.25, 0.4])
+def test_a_crease_counts_where_three_of_its_neighbours_are_creases(density):
+    crease = 40 * (np.random.default_rng(1).random((40, 50)) < density).astype(np.float32)
+    flat, ones = np.zeros_like(crease), np.full_like(crease, 9)
+    kind = np.where(crease > 0, EDGE_CONVEX, 0).astype(np.uint8)
+    found = selectEdges(EdgeStrength(flat, crease, kind, ones), None, 30, minLength=1, lineSignificance=0)
+    around = cv2.filter2D((crease > 0).astype(np.float32), -1, np.ones((3, 3)), borderType=cv2.BORDER_CONSTANT) - 1
+    assert np.array_equal(found > 0, (crease > 0) & (around >= 3))

@@ -22,6 +22,7 @@ from .. import __version__
 from .._check import described, error, named
 from .._option import parsed, takes
 from ..boundaries import RegionBoundaries, boundaries_of
+from ..cancellation import apart
 from ..detection import selected, thin_lines
 from ..distance import distanceTransform
 from ..draw import drawRegions, edge_overview, region_overview
@@ -140,7 +141,6 @@ def edge_files(found: EdgeResults, title: str, options: Mapping[str, Any]) -> di
     }
 
 
-@named("segment")
 def on_map(image: RangeImage | None) -> dict[str, Any]:
     """What GeoJSON takes of an image that lies on a map."""
     return {} if image is None else {"transform": image.georeference, "epsg": image.epsg}
@@ -151,6 +151,7 @@ def outlines_of(found: RegionResults) -> RegionBoundaries:
     return boundaries_of(found.labels, found.edges.frame, _OUTLINE)
 
 
+@named("segment")
 def region_files(
     found: RegionResults, title: str, options: Mapping[str, Any], image: RangeImage | None = None
 ) -> dict[str, bytes]:
@@ -208,7 +209,7 @@ def plain(value: Any) -> Any:
 
 def encoded(suffix: str, picture: np.ndarray) -> bytes:
     """A picture as the content of a file."""
-    return cv2.imencode(suffix, picture)[1].tobytes()
+    return apart(picture.size, cv2.imencode, suffix, picture)[1].tobytes()
 
 
 def _points_csv(points: np.ndarray) -> bytes:

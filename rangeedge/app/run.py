@@ -9,7 +9,7 @@ import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -23,6 +23,9 @@ from ..recording.manifest import Line, Manifest, changed, complete
 from ..recording.workers import expect_guard
 from .results import plain
 from .tasks import Counts
+
+if TYPE_CHECKING:
+    from ..recording.workers import Outcome
 
 _STAGE = re.compile(r"\.[0-9a-f]{32}\.tmp")  # what a run that was killed may leave behind
 
@@ -99,32 +102,50 @@ def run_frames(
         job.prepare(frames, fresh=not done)
         pending = [(index, frame) for index, frame in enumerate(frames) if frame.name not in done]
         modified = {frame.path: changed(frame.path) for _, frame in pending}
-        outcomes = outcomes_of(functools.partial(_warned, job), pending, **workers)
-        for index, frame in enumerate(frames):
-            where = str(job.place(frame))
-            if frame.name in done:
-                yield BatchItem(frame.title, where, "skipped", "")
-                continue
-            outcome = next(outcomes)
-            outputs, counts, warnings = outcome.value or ({}, {}, ())
-            line: Line = {
-                "frame": frame.name,
-                "input": frame.path,
-                "part": frame.part,
-                "index": index,
-                "state": "failed" if outcome.error else "written",
-                "outputs": outputs,
-                "counts": counts,
-                "seconds": round(outcome.seconds, 4),
-                "parameters": job.parameters(frame),
-                "modified": modified[frame.path],
-                "rangeedge": __version__,
-            }
-            said = {"error": outcome.error, "warnings": list(warnings)}
-            manifest.append(line | {name: value for name, value in said.items() if value})
-            yield BatchItem(frame.title, where, line["state"], outcome.error, warnings)
-            if outcome.full:
-                raise error(f"nothing more can be written to {str(job.out)!r}; make room, and run it again")
+        outcomes: Any = outcomes_of(functools.partial(_warned, job), pending, **workers)
+        try:
+            yield from _items(job, frames, manifest, done, modified, outcomes)
+        except BaseException:
+            outcomes.close()
+            if workers.get("client") is None:  # whose workers may still be writing
+                _sweep(job.out)
+            raise
+
+
+def _items(
+    job: Job,
+    frames: list[FrameSource],
+    manifest: Manifest,
+    done: set[str],
+    modified: dict[str, Any],
+    outcomes: Iterator[Outcome],
+) -> Iterator[BatchItem]:
+    """What becomes of each frame, noted down before it is told."""
+    for index, frame in enumerate(frames):
+        where = str(job.place(frame))
+        if frame.name in done:
+            yield BatchItem(frame.title, where, "skipped", "")
+            continue
+        outcome = next(outcomes)
+        outputs, counts, warnings = outcome.value or ({}, {}, ())
+        line: Line = {
+            "frame": frame.name,
+            "input": frame.path,
+            "part": frame.part,
+            "index": index,
+            "state": "failed" if outcome.error else "written",
+            "outputs": outputs,
+            "counts": counts,
+            "seconds": round(outcome.seconds, 4),
+            "parameters": job.parameters(frame),
+            "modified": modified[frame.path],
+            "rangeedge": __version__,
+        }
+        said = {"error": outcome.error, "warnings": list(warnings)}
+        manifest.append(line | {name: value for name, value in said.items() if value})
+        yield BatchItem(frame.title, where, line["state"], outcome.error, warnings)
+        if outcome.full:
+            raise error(f"nothing more can be written to {str(job.out)!r}; make room, and run it again")
 
 
 def _expect_apart(job: Job, frames: list[FrameSource]) -> None:

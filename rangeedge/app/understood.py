@@ -41,8 +41,9 @@ def sentence(known: dict[str, Any]) -> str:
         return f"{known['geometry']}, no data"
     low, high = known["depthRange"]
     jump = known["jumpThreshold"]
+    what = "heights" if known["geometry"].startswith("heights") else "depths"
     return (
-        f"{known['geometry']}, unit: {known['unit']}; depths {low:.4g} to {high:.4g},"
+        f"{known['geometry']}, unit: {known['unit']}; {what} {low:.4g} to {high:.4g},"
         f" pixels {known['pixelSpacing']:.3g} apart,"
         f" noise {known['noiseAtMedian']:.2g} at the median {known['medianDepth']:.4g}; jumps"
         f" {jump if isinstance(jump, str) else f'from {jump:g}'}, creases from {known['creaseThreshold']:g} degrees"
@@ -53,7 +54,7 @@ def _unit(frame: Frame, params: ScanLineParams) -> str:
     """Of lengths, as far as it is known."""
     if frame.unit == "m":
         return "m (stored in mm)"
-    return f"units of {params.depthFactor:g} stored steps" if frame.step else "units of the stored values"
+    return f"{params.depthFactor:g} of the stored units" if frame.step else "that of the stored values"
 
 
 def _geometry(frame: Frame, params: ScanLineParams) -> str:

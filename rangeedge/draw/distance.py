@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 
 from .. import _check
+from ..bands import by_bands, chosen
 
 _UNREACHED = (128, 128, 128)  # infinitely far from every edge
 
@@ -67,12 +68,16 @@ def checked_distance(distance: np.ndarray, shape: tuple[int, int] | None = None)
 
 
 def distance_colours(distance: np.ndarray, maxDistance: float | None, log: bool) -> np.ndarray:
-    finite = np.isfinite(distance)
     if maxDistance is None:
-        maxDistance = float(distance[finite].max(initial=0)) or 1.0
-    scaled = np.where(finite, np.minimum(distance, maxDistance), 0) / maxDistance
-    if log:
-        scaled = np.log1p(scaled * maxDistance) / np.log1p(maxDistance)
-    colours = cv2.applyColorMap(np.rint(255 * scaled).astype(np.uint8), cv2.COLORMAP_INFERNO)
-    colours[~finite] = _UNREACHED
-    return colours
+        maxDistance = max(float(own.max(initial=0)) for own in chosen(distance, np.isfinite(distance))) or 1.0
+
+    def coloured(distance: np.ndarray) -> np.ndarray:
+        finite = np.isfinite(distance)
+        scaled = np.where(finite, np.minimum(distance, maxDistance), 0) / maxDistance
+        if log:
+            scaled = np.log1p(scaled * maxDistance) / np.log1p(maxDistance)
+        colours = cv2.applyColorMap(np.rint(255 * scaled).astype(np.uint8), cv2.COLORMAP_INFERNO)
+        colours[~finite] = _UNREACHED
+        return colours
+
+    return by_bands(coloured, distance)

@@ -18,7 +18,7 @@ from ..selection import strengthImage
 from .distance import checked_distance, distance_colours
 from .palette import LINE_KINDS, colour_index, paint
 from .regions import drawRegions, write_numbers
-from .relief import hatch, relief_of, subdued
+from .relief import hatched, relief_of, subdued
 from .sheet import BACKGROUND, key_to, sentence, sheet, with_axes
 
 if TYPE_CHECKING:
@@ -275,4 +275,4 @@ def _distance_panel(distance: np.ndarray, valid: np.ndarray) -> tuple[str, np.nd
     longest = float(finite.max(initial=0))
     colours = distance_colours(distance, longest or None, False)
     caption = f"Distance to the edges, up to {longest:.3g} pixels" if finite.size else "Distance: no edges"
-    return caption, np.where(valid[..., np.newaxis], colours, hatch(valid.shape))
+    return caption, hatched(colours, valid)

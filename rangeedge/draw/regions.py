@@ -11,6 +11,7 @@ import numpy as np
 
 from .. import _check
 from .._option import takes
+from ..bands import bands, by_bands, chosen, numbered
 from ..options import GEOMETRY
 from .relief import backdrop, nearest
 
@@ -82,8 +83,11 @@ def drawRegions(
         canvas = backdrop(src, geometry, labels.shape)
     inside = labels > 0
     if inside.any():
-        colours = _region_colours(labels, inside)
-        canvas[inside] = np.rint(alpha * colours + (1 - alpha) * canvas[inside])
+        choice = _region_colours(labels, inside)
+        for rows in bands(canvas):
+            own, here = canvas[rows], inside[rows]
+            colours = REGION_COLOURS[choice[labels[rows][here]]]
+            own[here] = np.rint(alpha * colours + (1 - alpha) * own[here])
     return _check.deliver("dst", canvas, dst)
 
 
@@ -104,41 +108,46 @@ def write_numbers(picture: np.ndarray, labels: np.ndarray) -> int:
 
 
 def _middles(labels: np.ndarray) -> Iterator[tuple[int, tuple[int, int], float]]:
-    """Of every region the label, the pixel farthest from its border, and how far that is."""
+    """Of every region with an inside the label, the pixel farthest from its border, and how far that is."""
     framed = np.pad(labels, 1)
     inside = labels > 0
     for row, col in ((0, 1), (2, 1), (1, 0), (1, 2)):
         inside &= framed[row : row + labels.shape[0], col : col + labels.shape[1]] == labels
     room = cv2.distanceTransform(np.pad(inside.view(np.uint8), 1), cv2.DIST_L2, cv2.DIST_MASK_5)[1:-1, 1:-1] + 1
-    order = np.argsort(room, axis=None, kind="stable")
-    order = order[labels.flat[order] > 0]
-    names, last = np.unique(labels.flat[order[::-1]], return_index=True)
-    for label, place in zip(names.tolist(), order[::-1][last].tolist(), strict=True):
+    peaks = np.flatnonzero((room == cv2.dilate(room, np.ones((3, 3), np.uint8))) & (labels > 0))
+    peaks = peaks[np.argsort(-room.flat[peaks], kind="stable")]
+    names, first = np.unique(labels.flat[peaks], return_index=True)
+    for label, place in zip(names.tolist(), peaks[first].tolist(), strict=True):
         yield label, divmod(place, labels.shape[1]), float(room.flat[place])
 
 
 def _region_colours(labels: np.ndarray, inside: np.ndarray) -> np.ndarray:
-    """Colour of every pixel inside a region."""
-    names, region = np.unique(labels[inside], return_inverse=True)
-    region = region.reshape(-1)
-    choice = shared_out(names, _neighbours(region[nearest(inside)]))
-    return REGION_COLOURS[choice[region]]
+    """The number of the colour of every label > 0."""
+    inner = np.concatenate(list(chosen(labels, inside)))
+    names, region = numbered(inner)
+    neighbours = _neighbours(by_bands(lambda number: region[number], nearest(inside)))
+    choice = np.zeros(names[-1] + 1, np.intp)
+    choice[names] = shared_out(names, neighbours)
+    return choice
 
 
 def _neighbours(region: np.ndarray) -> dict[int, set[int]]:
     """Which regions touch, 8-connected, in a map that regions fill."""
     neighbours = defaultdict(set)
-    for a, b in (
-        (region[:, 1:], region[:, :-1]),
-        (region[1:], region[:-1]),
-        (region[1:, 1:], region[:-1, :-1]),
-        (region[1:, :-1], region[:-1, 1:]),
-    ):
-        differ = a != b
-        pairs = np.unique(a[differ] * (region.max() + 1) + b[differ])
-        for i, j in zip(*(part.tolist() for part in np.divmod(pairs, region.max() + 1)), strict=True):
-            neighbours[i].add(j)
-            neighbours[j].add(i)
+    count = int(region.max()) + 1
+    for rows in bands(region):
+        own = region[rows.start : rows.stop + 1]  # and the first row below
+        for a, b in (
+            (own[:, 1:], own[:, :-1]),
+            (own[1:], own[:-1]),
+            (own[1:, 1:], own[:-1, :-1]),
+            (own[1:, :-1], own[:-1, 1:]),
+        ):
+            differ = a != b
+            pairs = np.unique(a[differ] * count + b[differ])
+            for i, j in zip(*(part.tolist() for part in np.divmod(pairs, count)), strict=True):
+                neighbours[i].add(j)
+                neighbours[j].add(i)
     return neighbours
 
 

@@ -9,6 +9,8 @@ import cv2
 import numpy as np
 
 from .. import _check
+from ..bands import by_bands, distinct
+from ..cancellation import apart
 from ..constants import EDGE_CONCAVE, EDGE_CONVEX, EDGE_JUMP
 from ..distance import distanceTransformWithLabels
 from .counts import Counts, ratio
@@ -342,7 +344,7 @@ def baddeleyDelta(edges: np.ndarray, truth: np.ndarray, k: float = 2.0, cutoff: 
 
 def _truth_map(truth: Any) -> np.ndarray:
     truth = _check.image8("truth", truth)
-    unknown = np.setdiff1d(truth, _CLASSES)
+    unknown = np.setdiff1d(distinct(truth), _CLASSES)
     if unknown.size:
         got = f"class {unknown[0]}"
         raise _check.fail("truth", f"of the classes {_CLASSES}", got, cv2.Error.StsOutOfRange)
@@ -374,7 +376,7 @@ def _skeleton(edges: np.ndarray) -> np.ndarray:
     # Not by our own thinning: a score must not depend on what it scores.
     from skimage.morphology import skeletonize
 
-    return skeletonize(edges)
+    return apart(edges.size, skeletonize, edges)
 
 
 def _nearest(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -383,9 +385,14 @@ def _nearest(edges: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     if not edges.any():
         return np.full(edges.shape, np.inf), np.full(edges.shape, -1)
     # Transposed, so that of several nearest pixels the leftmost wins, as in SciPy's transform.
-    col, row = np.divmod(distanceTransformWithLabels(edges.T)[1].T, height)
-    y, x = np.ogrid[:height, :width]
-    return np.sqrt(((y - row) ** 2 + (x - col) ** 2).astype(np.float64)), row * width + col
+    labels = distanceTransformWithLabels(edges.T)[1].T
+    rows, x = np.arange(height)[:, None], np.arange(width)
+
+    def distance(y: np.ndarray, labels: np.ndarray) -> np.ndarray:
+        col, row = np.divmod(labels, height)
+        return np.sqrt(((y - row) ** 2 + (x - col) ** 2).astype(np.float64))
+
+    return by_bands(distance, rows, labels), by_bands(lambda own: own % height * width + own // height, labels)
 
 
 def _distance(edges: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from .. import _check
+from ..bands import by_bands, counts, numbered
 from .counts import Counts, ratio
 
 
@@ -154,7 +155,8 @@ def _overlaps(labels: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, ...]:
     """The pairs of a region found and a true one that share pixels, how many, and the sizes of either side."""
     found_ids, found, found_size = _numbered(labels)
     true_ids, true, true_size = _numbered(truth)
-    pairs, overlap = np.unique(found * len(true_ids) + true, return_counts=True)
+    pairs, pair = numbered(by_bands(lambda m, n: m * len(true_ids) + n, found, true))
+    overlap = counts(pair, len(pairs))
     m, n = np.divmod(pairs, max(len(true_ids), 1))
     background = [int((ids[:1] == 0).any()) for ids in (found_ids, true_ids)]
     both = (m >= background[0]) & (n >= background[1])
@@ -169,8 +171,8 @@ def _overlaps(labels: np.ndarray, truth: np.ndarray) -> tuple[np.ndarray, ...]:
 
 def _numbered(labels: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The labels that there are, ascending, where in that list each pixel is, and how many pixels each has."""
-    ids, number, count = np.unique(np.maximum(labels.ravel(), 0), return_inverse=True, return_counts=True)
-    return ids, number.ravel(), count
+    ids, number = numbered(np.maximum(labels.ravel(), 0))
+    return ids, number, counts(number, len(ids))
 
 
 def _parts(wholes: np.ndarray, inside: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:

@@ -9,10 +9,12 @@ from typing import IO, Any
 
 import numpy as np
 
+from .._check import reals
 from .range_image import RangeImage
 from .source import FILE_LIMIT, expect_size, expect_unpacked
 
 _SOURCES = ("src", "xyz", "points", "depth", "z")
+_AT_A_TIME = 2**22  # bytes that are packed in one call
 _GEOMETRY_BYTES = 4096  # more than any geometry takes
 
 
@@ -96,15 +98,20 @@ def _member(archive: zipfile.ZipFile, member: zipfile.ZipInfo, limit: int) -> np
 
 # What an array in an NPZ file stands for.
 _GEOMETRY: dict[str, Callable[[np.ndarray], Any]] = {
-    "K": lambda value: np.array(value, dtype=np.float64),
-    "distCoeffs": lambda value: np.array(value, dtype=np.float64),
-    "pixelSize": lambda value: tuple(np.broadcast_to(value.astype(np.float64), 2).tolist()),
+    "K": reals,
+    "distCoeffs": reals,
+    "pixelSize": lambda value: tuple(np.broadcast_to(reals(value), 2).tolist()),
     "heightMap": lambda value: bool(value.item()),
-    "depthFactor": lambda value: float(value.item()),
+    "depthFactor": lambda value: float(reals(value).item()),
 }
 
 
 def write_npz(src: np.ndarray, **geometry: Any) -> bytes:
     stream = io.BytesIO()
-    np.savez_compressed(stream, src=src, **geometry)
+    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, value in {"src": src, **geometry}.items():
+            data = memoryview(write_npy(np.asanyarray(value)))
+            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                for start in range(0, len(data), _AT_A_TIME):
+                    member.write(data[start : start + _AT_A_TIME])
     return stream.getvalue()

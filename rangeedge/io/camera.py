@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._check import public
+from .._check import public, reals
 from .arrays import arrays_of_npz, read_npy
 from .settings import parse
 from .source import file_name, opened
@@ -51,7 +51,7 @@ def read_camera(path: str | os.PathLike[str]) -> Camera:
 
 def matrix_of(values: Any) -> np.ndarray:
     """The camera matrix in (fx, fy, cx, cy), 9 numbers by rows or columns, 3x3, a projection 3x4, or 4x4."""
-    array = np.array(values, dtype=np.float64)
+    array = reals(values)
     if 1 in array.shape:
         array = array.ravel()
     if array.shape == (4,):

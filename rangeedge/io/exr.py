@@ -7,6 +7,7 @@ from types import ModuleType
 
 import numpy as np
 
+from ..cancellation import apart
 from .source import expect_pixels, expect_unpacked
 
 BACKGROUND = 1e10  # what Blender writes where a ray hits nothing
@@ -90,7 +91,7 @@ def write_exr(src: np.ndarray) -> bytes:
     openexr = _openexr()
     header = {"compression": openexr.ZIP_COMPRESSION, "type": openexr.scanlineimage}
     stream = io.BytesIO()
-    openexr.File(header, {"Z": np.ascontiguousarray(src)}).write(stream)
+    apart(src.size, openexr.File(header, {"Z": np.ascontiguousarray(src)}).write, stream)
     return stream.getvalue()
 
 

@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 
 from .._check import error, fail
+from ..cancellation import apart
 from .polylines import REGION, Line, grouped, no_pixels
 from .settings import xml_root
 
@@ -81,7 +82,7 @@ def write_svg(lines: list[Line], picture: np.ndarray | None = None) -> bytes:
     # Pixel (0, 0) has its centre there, and its corner at (-0.5, -0.5).
     text = [f'<svg xmlns="http://www.w3.org/2000/svg" {size} viewBox="-0.5 -0.5 {width} {height}">']
     if picture is not None:
-        png = base64.b64encode(cv2.imencode(".png", picture)[1].tobytes()).decode()
+        png = base64.b64encode(apart(picture.size, cv2.imencode, ".png", picture)[1].tobytes()).decode()
         text.append(f'<image x="-0.5" y="-0.5" {size} href="data:image/png;base64,{png}"/>')
     text.append('<g fill="none" stroke-linejoin="round" stroke-linecap="round">')
     for group in grouped(lines):

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import cv2
 import numpy as np
 
-from .._check import array, described, error, fail, public
+from .._check import array, described, error, fail, public, reals
 from .atomic import write_atomically
 from .polylines import Line, toLines
 from .source import file_name, opened
@@ -196,7 +196,7 @@ def _transform(transform: Any) -> np.ndarray:
     """Map coordinates of pixel centres as an affine map of (column, row, 1)."""
     expected = "a (2, 3) array, or six finite numbers"
     try:
-        numbers = np.array(transform, dtype=np.float64)
+        numbers = reals(transform)
     except (TypeError, ValueError, OverflowError):
         raise fail("transform", expected, described(transform)) from None
     if numbers.shape not in ((2, 3), (6,)) or not np.isfinite(numbers).all():

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from .. import _core
+from ..cancellation import apart
 from .source import HEADER_LIMIT, expect_at_least, expect_pixels, expect_unpacked, inflate
 from .text import numbers
 
@@ -85,7 +86,7 @@ def _png_chunks(data: bytes) -> tuple[int, int, int, int, int, int, int, bytes]:
 def write_png(src: np.ndarray) -> bytes:
     if src.ndim != 2 or src.dtype != np.uint16:
         raise ValueError("(H, W) uint16")
-    written, data = cv2.imencode(".png", src)
+    written, data = apart(src.size, cv2.imencode, ".png", src)
     if not written:
         raise ValueError("what OpenCV can encode")
     return data.tobytes()

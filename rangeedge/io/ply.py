@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import _core
+from ..bands import bands, by_bands, chosen
 from .points import points_of, unorganized
 from .source import expect_at_least, expect_pixels
 from .text import header_lines, number, words
@@ -48,29 +49,38 @@ def read_ply(data: bytes) -> np.ndarray:
         raise ValueError(f"{rows} rows of {cols} columns do not hold the {len(index)} pixels of its range_grid")
     if not index.max() < len(points):
         raise ValueError(f"its range_grid refers to vertex {index.max():g} of {len(points)}")
-    image = np.full((rows * cols, 3), np.nan, np.float32)
-    hit = index >= 0
-    image[hit] = points[index[hit].astype(np.int64)]
-    return image.reshape(rows, cols, 3)
+
+    def seen(index: np.ndarray) -> np.ndarray:
+        hit = index >= 0
+        own = np.full((len(index), 3), np.nan, np.float32)
+        own[hit] = points[index[hit].astype(np.int64)]
+        return own
+
+    return by_bands(seen, index).reshape(rows, cols, 3)
 
 
 def write_ply(points: np.ndarray) -> bytes:
     """A binary PLY file of (H, W, 3) points with a range_grid, as Stanford's scans have it."""
     height, width = points.shape[:2]
-    valid = np.isfinite(points).all(axis=-1).ravel()
-    vertices = points.reshape(-1, 3)[valid].astype("<f4")
+    valid = by_bands(lambda own: np.isfinite(own).all(axis=-1), points).ravel()
+    vertices = b"".join(own.astype("<f4").tobytes() for own in chosen(points.reshape(-1, 3), valid))
+    count = len(vertices) // 12
     header = (
         f"ply\nformat binary_little_endian 1.0\nobj_info num_cols {width}\nobj_info num_rows {height}\n"
-        f"element vertex {len(vertices)}\nproperty float x\nproperty float y\nproperty float z\n"
+        f"element vertex {count}\nproperty float x\nproperty float y\nproperty float z\n"
         f"element range_grid {width * height}\nproperty list uchar int vertex_indices\nend_header\n"
     )
     # A pixel is a byte 0, or a byte 1 and the index of its vertex.
-    entry = np.zeros(len(valid), [("count", "u1"), ("index", "<i4")])
-    entry["count"] = valid
-    entry["index"][valid] = np.arange(len(vertices))
-    used = np.repeat(valid[:, None], 5, axis=1)
-    used[:, 0] = True
-    return header.encode() + vertices.tobytes() + entry.view(np.uint8).reshape(-1, 5)[used].tobytes()
+    grid, first = [], 0
+    for some in bands(valid):
+        own = valid[some]
+        entry = np.zeros(len(own), [("count", "u1"), ("index", "<i4")])
+        entry["count"] = own
+        entry["index"][own] = np.arange(first, first := first + np.count_nonzero(own))
+        used = np.repeat(own[:, None], 5, axis=1)
+        used[:, 0] = True
+        grid.append(entry.view(np.uint8).reshape(-1, 5)[used].tobytes())
+    return b"".join([header.encode(), vertices, *grid])
 
 
 class _Property(NamedTuple):
@@ -133,12 +143,14 @@ class _PlyBody:
         end = _core.ply_first_items(data, length.itemsize, self.byte_order == ">", item.itemsize, at)
         expect_at_least(len(data), end)
         self.at += end
-        values = np.full(element.count, -1.0)
-        filled = at >= 0
-        if filled.any():
-            anywhere = np.ndarray(len(data) - item.itemsize + 1, item, self.data, self.at - end, strides=(1,))
-            values[filled] = anywhere[at[filled]]
-        return {prop.name: values}
+        anywhere = np.ndarray(max(len(data) - item.itemsize + 1, 0), item, self.data, self.at - end, strides=(1,))
+
+        def first(at: np.ndarray) -> np.ndarray:
+            values = np.full(len(at), -1.0)
+            values[at >= 0] = anywhere[at[at >= 0]]
+            return values
+
+        return {prop.name: by_bands(first, at)}
 
     def _firsts(self, element: _Element) -> Iterator[float]:
         readers = [

@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from ..bands import by_bands
+
 
 def unorganized(why: str) -> ValueError:
     return ValueError(
@@ -19,19 +21,21 @@ def points_of(columns: Mapping[str, np.ndarray]) -> np.ndarray:
     names = {name.lower(): name for name in columns}
     if not {"x", "y", "z"} <= names.keys():
         raise ValueError(f"its points have no x, y and z but {', '.join(columns) or 'nothing'}")
-    points = np.empty((len(columns[names["x"]]), 3), np.float32)
-    missing = np.zeros(len(points), bool)
-    with np.errstate(over="ignore", invalid="ignore"):
-        for k, axis in enumerate("xyz"):
-            points[:, k] = columns[names[axis]]
-            missing |= ~np.isfinite(points[:, k])
-    points[missing] = np.nan
-    return points
+
+    def seen(*axes: np.ndarray) -> np.ndarray:
+        points = np.empty((len(axes[0]), 3), np.float32)
+        with np.errstate(over="ignore", invalid="ignore"):
+            for k, values in enumerate(axes):
+                points[:, k] = values
+        points[~np.isfinite(points).all(axis=1)] = np.nan
+        return points
+
+    return by_bands(seen, *(columns[names[axis]] for axis in "xyz"))
 
 
 def float32(values: np.ndarray) -> np.ndarray:
     with np.errstate(over="ignore", invalid="ignore"):
-        return values.astype(np.float32)
+        return by_bands(lambda own: own.astype(np.float32), values)
 
 
 def writer_of_points(encode: Callable[[np.ndarray], bytes]) -> Callable[[np.ndarray], bytes]:

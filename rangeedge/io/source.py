@@ -23,7 +23,7 @@ PIXEL_LIMIT = 2**28
 UNPACKED_FREELY = 2**28
 UNPACKED_RATIO = 100
 
-_AT_A_TIME = 2**24  # bytes that are unpacked in one call
+_AT_A_TIME = 2**22  # bytes that are unpacked in one call
 
 _KINDS = (
     (stat.S_ISDIR, "a directory"),

@@ -45,10 +45,11 @@ class Camera:
     geometry: dict[str, Any]
     distance: float
 
-    def pixels(self) -> tuple[np.ndarray, np.ndarray]:
-        """Coordinates x and y of all pixels, row by row."""
+    def pixels(self, rows: slice = slice(None)) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates x and y of all pixels of rows, one row after the other."""
         width, height = self.size
-        y, x = np.divmod(np.arange(width * height), width)
+        first, stop, _ = rows.indices(height)
+        y, x = np.divmod(np.arange(width * first, width * stop), width)
         return x.astype(np.float64), y.astype(np.float64)
 
     def view(self) -> tuple[float, float]:

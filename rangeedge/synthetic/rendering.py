@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 
 from .. import _check
+from ..bands import bands, distinct
 from ..constants import (
     DIR_COLS,
     DIR_DIAG45,
@@ -159,38 +160,39 @@ def renderScene(scene: Sequence[Solid], camera: Camera) -> Rendering:
     if not isinstance(camera, Camera):
         raise _check.fail("camera", "a Camera", _check.described(camera))
     width, height = camera.size
-    rays = origins, directions = camera.rays(*camera.pixels())
-    depth, faces = cast(scene, rays)
-    depth[faces < 0] = np.nan
-    points = origins + depth[:, None] * directions
-    normals = np.full_like(points, np.nan)
     every = [face for solid in scene for face in solid.faces]
-    for face, here in grouped(every, faces):
-        normals[here] = normals_toward_viewer(face, points[here], directions[here])
-    crossings = _crossings(every, camera, depth, faces)
-    faces = faces.reshape(height, width)
-    return Rendering(
-        tuple(scene),
-        camera,
-        depth.reshape(height, width),
-        points.reshape(height, width, 3),
-        normals.reshape(height, width, 3),
-        faces,
-        _labels(faces),
-        crossings,
-    )
+    depth, faces = np.empty((height, width)), np.empty((height, width), np.int32)
+    points, normals = np.empty((height, width, 3)), np.full((height, width, 3), np.nan)
+    for rows in bands(points):
+        origins, directions = camera.rays(*camera.pixels(rows))
+        own, seen = cast(scene, (origins, directions))
+        own[seen < 0] = np.nan
+        depth[rows], faces[rows] = own.reshape(-1, width), seen.reshape(-1, width)
+        places = origins + own[:, None] * directions
+        points[rows] = places.reshape(-1, width, 3)
+        toward = normals[rows].reshape(-1, 3)
+        for face, here in grouped(every, seen):
+            toward[here] = normals_toward_viewer(face, places[here], directions[here])
+    crossings = _crossings(every, camera, depth.ravel(), faces)
+    return Rendering(tuple(scene), camera, depth, points, normals, faces, _labels(faces), crossings)
 
 
 def grouped(every: Sequence[Face], numbers: np.ndarray) -> Iterator[tuple[Face, np.ndarray]]:
     """Each face that occurs in `numbers`, with the places where."""
-    for number in np.unique(numbers[numbers >= 0]):
+    for number in _those_of(numbers):
         yield every[number], np.flatnonzero(numbers == number)
+
+
+def _those_of(faces: np.ndarray) -> np.ndarray:
+    """The numbers of the faces that are seen."""
+    numbers = distinct(faces)
+    return numbers[numbers >= 0]
 
 
 def _labels(faces: np.ndarray) -> np.ndarray:
     labels = np.zeros(faces.shape, np.int32)
     used = 0
-    for number in np.unique(faces[faces >= 0]):
+    for number in _those_of(faces):
         here = faces == number
         count, parts = cv2.connectedComponents(here.view(np.uint8), connectivity=8)
         labels[here] = parts[here] + used
@@ -215,8 +217,9 @@ _CROSSING = np.dtype(
 
 def _crossings(every: Sequence[Face], camera: Camera, depth: np.ndarray, faces: np.ndarray) -> np.ndarray:
     first, second, direction = _neighbours(camera.size, faces)
-    x, y = camera.pixels()
-    start, way = np.stack([x[first], y[first]]), np.stack([x[second] - x[first], y[second] - y[first]])
+    faces = faces.ravel()
+    start, end = (np.stack(np.divmod(side, camera.size[0])[::-1]).astype(np.float64) for side in (first, second))
+    way = end - start
     groups = [list(grouped(every, faces[side])) for side in (first, second)]
 
     def rays_at(share: np.ndarray) -> Rays:
@@ -267,13 +270,15 @@ def _crossings(every: Sequence[Face], camera: Camera, depth: np.ndarray, faces: 
 def _neighbours(size: tuple[int, int], faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pairs of neighbouring pixels that see different faces, and the direction from the first to the second."""
     width, height = size
-    indices = np.arange(width * height).reshape(height, width)
     pairs = []
     for direction, (dx, dy) in _STEPS.items():
-        rows = (slice(max(0, -dy), height - max(0, dy)), slice(max(0, dy), height + min(0, dy)))
-        first, second = indices[rows[0], : width - dx].ravel(), indices[rows[1], dx:].ravel()
-        differ = (faces[first] != faces[second]) & (faces[first] >= 0) & (faces[second] >= 0)
-        pairs.append((first[differ], second[differ], np.full(differ.sum(), direction)))
+        first = faces[max(0, -dy) : height - max(0, dy), : width - dx]
+        second = faces[max(0, dy) : height + min(0, dy), dx:]
+        for rows in bands(first):
+            a, b = first[rows], second[rows]
+            row, col = np.nonzero((a != b) & (a >= 0) & (b >= 0))
+            pixel = (row + rows.start + max(0, -dy)) * width + col
+            pairs.append((pixel, pixel + dy * width + dx, np.full(len(pixel), direction)))
     return tuple(np.concatenate(column) for column in zip(*pairs, strict=True))
 
 

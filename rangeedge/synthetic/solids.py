@@ -269,7 +269,7 @@ def cone(apex: Vector, axis: Vector, radius: float, height: float) -> Solid:
 def vector(name: str, value: Any, length: int = 3) -> np.ndarray:
     """A checked argument as float64."""
     try:
-        result = np.asarray(value, np.float64)
+        result = _check.reals(value)
     except (TypeError, ValueError, OverflowError):
         result = np.empty(0)
     if result.shape != (length,) or not np.isfinite(result).all():

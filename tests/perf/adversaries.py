@@ -128,12 +128,12 @@ MARKERS: Images = {
 
 def _blocks(shape: Shape, side: int) -> np.ndarray:
     v, u = _indices(shape)
-    return 1 + v // side * (shape[1] // side + 1) + u // side
+    return 1 + v // side * ((shape[1] - 1) // side + 1) + u // side
 
 
 def _bricks(shape: Shape) -> np.ndarray:
     v, u = _indices(shape)
-    return 1 + v // 8 * (shape[1] // 8 + 2) + (u + v // 8 % 2 * 4) // 8
+    return 1 + v // 8 * ((shape[1] + 3) // 8 + 1) + (u + v // 8 % 2 * 4) // 8
 
 
 LABELS: Images = {

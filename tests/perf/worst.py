@@ -137,6 +137,7 @@ def functions() -> dict[str, Callable[[Images], Cases]]:
         "edgePoints": lambda images: images.of_depths(rr.edgePoints, only="noise"),
         "flyingPixels": lambda images: images.of_depths(rr.flyingPixels, only="noise", K=(500, 500, 0, 0)),
         "selectEdges": _strengths,
+        "selectEdges, dynamic": partial(_strengths, dynamic=True),
         "thinEdges": lambda images: images.of(rr.thinEdges, lambda: rr.selectEdges(images.found[1]), adversaries.EDGES),
         "detectEdges": lambda images: images.of_depths(rr.detectEdges),
         "explainPixel": lambda images: images.of_depths(partial(_explained, rr.explainPixel), only="noise"),
@@ -187,15 +188,12 @@ def _explained(function: Callable[..., Any], src: np.ndarray, **told: Any) -> An
     return function(src, src.shape[1] // 2, src.shape[0] // 2, **told)
 
 
-def _strengths(images: Images) -> Cases:
+def _strengths(images: Images, dynamic: bool = False) -> Cases:
     strength = images.found[1]
-    yield "typical", lambda: partial(rr.selectEdges, strength)
-    yield "typical, dynamic", lambda: partial(rr.selectEdges, strength, dynamic=True)
+    yield "typical", lambda: partial(rr.selectEdges, strength, dynamic=dynamic)
     for name, make in (adversaries.SALIENCES | {"noise, float": adversaries.uniform}).items():
-        for dynamic in (False, True):
-            jump = make(images.shape).astype(np.float32)
-            how = f"{name}, dynamic" if dynamic else name
-            yield how, lambda jump=jump, dynamic=dynamic: partial(rr.selectEdges, jump, jump, 0.1, dynamic=dynamic)
+        jump = make(images.shape).astype(np.float32)
+        yield name, lambda jump=jump: partial(rr.selectEdges, jump, jump, 0.1, dynamic=dynamic)
 
 
 def _chains(images: Images) -> Cases:

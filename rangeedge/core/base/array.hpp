@@ -15,13 +15,16 @@ public:
     using Index = std::ptrdiff_t;
 
     Array() = default;
-    explicit Array(Index size, const T& value = T()) : values_(at(size), value) {}
+    explicit Array(Index size, const T& value = T()) { resize(size, value); }
 
     Index size() const { return static_cast<Index>(values_.size()); }
     int count() const { return static_cast<int>(values_.size()); }  // where that is known to suffice
     bool empty() const { return values_.empty(); }
-    void resize(Index size, const T& value = T()) { values_.resize(at(size), value); }
-    void assign(Index size, const T& value) { values_.assign(at(size), value); }
+    void resize(Index size, const T& value = T()) { fill_up(values_, at(size), value); }
+    void assign(Index size, const T& value) {
+        values_.clear();
+        fill_up(values_, at(size), value);
+    }
     void clear() { values_.clear(); }
     void push_back(const T& value) { values_.push_back(value); }
     void swap(Array& other) { values_.swap(other.values_); }
@@ -39,7 +42,7 @@ public:
 
 private:
     static std::size_t at(Index i) { return static_cast<std::size_t>(i); }
-    std::vector<T, LargeAllocator<T>> values_;
+    LargeVector<T> values_;
 };
 
 }  // namespace rangeedge

@@ -2,10 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <new>
 #include <utility>
+#include <vector>
+
+#include "base/watch.hpp"
 
 #if defined(__linux__)
 #include <sys/mman.h>
@@ -60,5 +64,20 @@ private:
 
     static bool is_large(std::size_t n) { return n > least / sizeof(T); }
 };
+
+template <class T>
+using LargeVector = std::vector<T, LargeAllocator<T>>;
+
+// As resize(size, value), with checkpoints: memory that is touched for the first time comes slowly.
+template <class T>
+void fill_up(LargeVector<T>& values, std::size_t size, const T& value) {
+    constexpr std::size_t block = (std::size_t{1} << 22) / sizeof(T) + 1;
+    if (size > values.capacity()) values.reserve(std::max(size, 2 * values.capacity()));
+    while (values.size() + block < size) {
+        values.resize(values.size() + block, value);
+        Watch::checkpoint();
+    }
+    values.resize(size, value);
+}
 
 }  // namespace rangeedge

@@ -131,6 +131,7 @@ private:
 // Columns that one thread treats together: whole cache lines of a row, and more of them where an image is so wide that
 // there are strips enough, since rows are read faster the longer they are.
 constexpr int least_strip = 64, most_strip = 512;
+constexpr int rows_between_checkpoints = 64;  // of a strip
 
 int strip_width(int cols, int threads) {
     constexpr int strips = 4;  // of a thread
@@ -143,13 +144,16 @@ void nearest_in_columns(const Edges& sources, const Grid& grid, int first, int l
     constexpr std::int32_t none = std::numeric_limits<std::int32_t>::min() / 2;
     std::int32_t nearest[most_strip];
     std::fill_n(nearest, last - first, none);
+    Checkpoints checkpoints(rows_between_checkpoints);
     for (int y = 0; y < grid.rows; ++y) {
+        checkpoints.pass();
         const std::uint8_t* edges = sources.edges + grid.index(y, first);
         std::int32_t* row = rows + grid.index(y, first);
         for (int c = 0; c < last - first; ++c) row[c] = nearest[c] = edges[c] ? y : nearest[c];
     }
     std::fill_n(nearest, last - first, -none);
     for (int y = grid.rows - 1; y >= 0; --y) {
+        checkpoints.pass();
         std::int32_t* row = rows + grid.index(y, first);
         for (int c = 0; c < last - first; ++c) {
             nearest[c] = row[c] == y ? y : nearest[c];
@@ -164,11 +168,14 @@ void nearest_in_columns(const Sources& sources, const Grid& grid, int first, int
     std::vector<Envelope> envelopes(static_cast<std::size_t>(last - first));
     const auto envelope = [&](int c) -> Envelope& { return envelopes[static_cast<std::size_t>(c)]; };
     for (int c = 0; c < last - first; ++c) envelope(c).reset(grid.rows, grid.aspect());
-    for (int y = 0; y < grid.rows; ++y)
+    Checkpoints checkpoints(rows_between_checkpoints);
+    for (int y = 0; y < grid.rows; ++y) {
+        checkpoints.pass();
         for (int x = first; x < last; ++x) {
             const std::size_t p = grid.index(y, x);
             if (sources.is_source(p)) envelope(x - first).push(y, sources.height(p), y);
         }
+    }
     std::int32_t current[most_strip];
     int next[most_strip] = {}, change[most_strip];  // the next piece and the row at which it begins
     for (int c = 0; c < last - first; ++c) {
@@ -176,6 +183,7 @@ void nearest_in_columns(const Sources& sources, const Grid& grid, int first, int
         change[c] = envelope(c).size() > 0 ? 0 : grid.rows;
     }
     for (int y = 0; y < grid.rows; ++y) {
+        checkpoints.pass();
         std::int32_t* row = rows + grid.index(y, first);
         for (int c = 0; c < last - first; ++c) {
             if (change[c] == y) {

@@ -24,6 +24,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/memory.hpp"
 #include "base/parallel.hpp"
 #include "distance/distance.hpp"
 
@@ -94,11 +95,11 @@ private:
     }
 
     Grid grid_;
-    std::vector<float> clearance_;  // pixels to the nearest barrier
+    LargeVector<float> clearance_;  // pixels to the nearest barrier
 };
 
 // The nearest source where it is in sight; of several as near also one that is nearest to a neighbour. Else -1.
-std::int32_t nearest_in_sight(const Terrain& terrain, const std::vector<std::int32_t>& nearest, int row, int col) {
+std::int32_t nearest_in_sight(const Terrain& terrain, const LargeVector<std::int32_t>& nearest, int row, int col) {
     const Grid& grid = terrain.grid();
     const auto p = static_cast<std::int32_t>(grid.index(row, col));
     const std::int32_t source = nearest[static_cast<std::size_t>(p)];
@@ -117,12 +118,18 @@ std::int32_t nearest_in_sight(const Terrain& terrain, const std::vector<std::int
 
 class Shadows {
 public:
-    Shadows(const Terrain& terrain, const Grid& grid, std::vector<std::int32_t>& labels)
-        : terrain_(terrain), grid_(grid), labels_(labels), corner_(labels), before_(labels.size(), 0.0),
-          length_(labels.size(), std::numeric_limits<double>::infinity()) {}
+    Shadows(const Terrain& terrain, const Grid& grid, LargeVector<std::int32_t>& labels)
+        : terrain_(terrain), grid_(grid), labels_(labels), corner_(labels.size()), before_(labels.size()),
+          length_(labels.size()) {}
 
-    // To be called for every pixel whose label is in sight, before `settle`.
-    void start_at(std::int32_t p) { length_[at(p)] = terrain_.length(terrain_.offset(p, labels_[at(p)])); }
+    // To be called for every pixel before `settle`; -1 is the label of those that see no source.
+    void start_at(std::int32_t p) {
+        const std::int32_t source = labels_[at(p)];
+        corner_[at(p)] = source;
+        before_[at(p)] = 0;
+        length_[at(p)] =
+            source < 0 ? std::numeric_limits<double>::infinity() : terrain_.length(terrain_.offset(p, source));
+    }
 
     void settle() {
         Checkpoints checkpoints(256);
@@ -187,10 +194,10 @@ private:
 
     const Terrain& terrain_;
     Grid grid_;
-    std::vector<std::int32_t>& labels_;
-    std::vector<std::int32_t> corner_;  // where a pixel's way first bends, or ends
-    std::vector<double> before_;        // length of the way from there
-    std::vector<double> length_;
+    LargeVector<std::int32_t>& labels_;
+    LargeVector<std::int32_t> corner_;  // where a pixel's way first bends, or ends
+    LargeVector<double> before_;        // length of the way from there
+    LargeVector<double> length_;
     using Entry = std::pair<double, std::int32_t>;
     std::priority_queue<Entry, std::vector<Entry>, std::greater<Entry>> queue_;
 };
@@ -199,32 +206,38 @@ private:
 
 void geodesic_transform(const std::uint8_t* edges, const std::uint8_t* barrier, const Grid& grid, float* distance,
                         std::int32_t* labels, int threads) {
-    const std::size_t count = grid.index(grid.rows, 0);
-    std::vector<std::uint8_t> walls(count), sources(count);
-    for (std::size_t p = 0; p < count; ++p) walls[p] = barrier[p] != 0;
-    for (std::size_t p = 0; p < count; ++p) sources[p] = edges[p] && !walls[p];
-    std::vector<std::int32_t> nearest(count);
+    const auto count = static_cast<std::int32_t>(grid.index(grid.rows, 0));
+    const auto at = [](std::int32_t p) { return static_cast<std::size_t>(p); };
+    LargeVector<std::uint8_t> walls(at(count)), sources(at(count));
+    LargeVector<std::int32_t> nearest(at(count));
+    Team team(std::min(threads, grid.rows));
+    const auto for_pixels = [&](auto&& visit) {
+        parallel_for(count, team, [&](int begin, int end, int) {
+            for (std::int32_t p = begin; p < end; ++p) visit(p);
+        });
+    };
+    for_pixels([&](std::int32_t p) {
+        walls[at(p)] = barrier[p] != 0;
+        sources[at(p)] = edges[p] && !barrier[p];
+    });
     distance_transform(sources.data(), grid, distance, nearest.data(), threads);
 
     const Terrain terrain(walls.data(), grid, threads);
-    std::vector<std::int32_t> seen(count, -1);
-    Team team(std::min(threads, grid.rows));
+    LargeVector<std::int32_t> seen(at(count));
     parallel_each(grid.rows, team, [&](int row, int) {
-        for (int col = 0; col < grid.cols; ++col)
-            if (!walls[grid.index(row, col)]) seen[grid.index(row, col)] = nearest_in_sight(terrain, nearest, row, col);
+        for (int col = 0; col < grid.cols; ++col) {
+            const std::size_t p = grid.index(row, col);
+            seen[p] = walls[p] ? -1 : nearest_in_sight(terrain, nearest, row, col);
+        }
     });
-    nearest = seen;
+    for_pixels([&](std::int32_t p) { nearest[at(p)] = seen[at(p)]; });
     Shadows shadows(terrain, grid, nearest);
-    Checkpoints checkpoints;
-    for (std::size_t p = 0; p < count; ++p) {
-        checkpoints.pass();
-        if (seen[p] >= 0) shadows.start_at(static_cast<std::int32_t>(p));
-    }
+    for_pixels([&](std::int32_t p) { shadows.start_at(p); });
     shadows.settle();
-    for (std::size_t p = 0; p < count; ++p) {
-        if (seen[p] < 0) distance[p] = static_cast<float>(shadows.length(static_cast<std::int32_t>(p)));
-        if (labels) labels[p] = nearest[p];
-    }
+    for_pixels([&](std::int32_t p) {
+        if (seen[at(p)] < 0) distance[p] = static_cast<float>(shadows.length(p));
+        if (labels) labels[p] = nearest[at(p)];
+    });
 }
 
 }  // namespace rangeedge

@@ -3,8 +3,12 @@
 #include <nanobind/stl/array.h>
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <vector>
 
 #include "image/pixels.hpp"
+#include "image/ranks.hpp"
 #include "noise/estimate.hpp"
 #include "python/frame.hpp"
 
@@ -39,6 +43,29 @@ void bind_estimate(nb::module_& m) {
         array("ordinate"), "projective"_a, "step"_a, "threads"_a, Unlocked());
 }
 
+// For every share the values of the ranks below and above it, of which the first is of rank floor(share (n - 1)), n
+// being how many values are no NaN, which is returned.
+template <class T>
+void bind_ranks(nb::module_& m) {
+    m.def(
+        "ranked",
+        [](const Values<T>& values, const Values<double>& shares, const OutImage<T>& found) {
+            const auto size = static_cast<std::int64_t>(values.size());
+            const std::int64_t numbers = count_numbers(values.data(), size);
+            if (numbers == 0) return numbers;
+            std::vector<std::int64_t> ranks;
+            for (std::size_t i = 0; i < shares.size(); ++i) {
+                const double place = shares.data()[i] * static_cast<double>(numbers - 1);
+                ranks.push_back(static_cast<std::int64_t>(std::floor(place)));
+                ranks.push_back(static_cast<std::int64_t>(std::ceil(place)));
+            }
+            const std::vector<T> all = values_of_ranks(values.data(), size, ranks);
+            std::copy(all.begin(), all.end(), found.data());
+            return numbers;
+        },
+        array("values"), array("shares"), array("found"), Unlocked());
+}
+
 template <class T>
 using FrameInit = nb::init<nb::ndarray<const T, nb::c_contig, nb::device::cpu>, bool, const std::array<double, 6>&,
                            const std::array<double, 3>&, bool, bool, const BoundNoise&>;
@@ -59,6 +86,8 @@ void bind_image(nb::module_& m) {
     bind_inverse<std::uint16_t, float>(m);
     bind_estimate<float>(m);
     bind_estimate<double>(m);
+    bind_ranks<float>(m);
+    bind_ranks<double>(m);
 }
 
 }  // namespace rangeedge::python

@@ -53,8 +53,11 @@ private:
 
 bool Closer::lies_on(const Pixels& pixels, const Surface& surface) const {
     const double limit = parameters_.tolerance * parameters_.tolerance;
-    const auto near =
-        std::count_if(pixels.begin(), pixels.end(), [&](int p) { return image_.residual(p, surface) <= limit; });
+    Checkpoints checkpoints;
+    const auto near = std::count_if(pixels.begin(), pixels.end(), [&](int p) {
+        checkpoints.pass();
+        return image_.residual(p, surface) <= limit;
+    });
     return static_cast<double>(near) >= parameters_.share * static_cast<double>(pixels.size());
 }
 

@@ -197,9 +197,12 @@ void Grower::over_tiles(const Tiles& tiles, double limit) {
         else
             choose_all(0, count, 0);
         for_owners(owners, [&](int owner) {
-            for (std::size_t k = 0; k < tiles_.size(); ++k)
+            Checkpoints checkpoints;
+            for (std::size_t k = 0; k < tiles_.size(); ++k) {
+                checkpoints.pass();
                 if (choices_[k].patch && choices_[k].residual < limit && choices_[k].patch % owners == owner)
                     take_tile(tiles, tiles_[k], choices_[k].patch, sums_[k]);
+            }
         });
         const std::size_t before = taken_.size();
         for (std::size_t k = 0; k < tiles_.size(); ++k) {

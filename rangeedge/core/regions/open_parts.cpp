@@ -18,13 +18,15 @@ OpenParts::OpenParts(const SurfaceImage& image, const std::int32_t* regions) : i
     part_.resize(image.size(), 0);
     marked_.resize(image.size(), 0);
     Pixels front;
-    for (int row = 0; row < image.rows(); ++row)
+    for (int row = 0; row < image.rows(); ++row) {
+        Watch::checkpoint();
         for (int col = 0; col < image.cols(); ++col) {
             const int p = image.index(row, col);
             if (!image.open(p)) continue;
             part_[p] = regions[std::ptrdiff_t{row} * image.cols() + col];
             if (part_[p]) front.push_back(p);
         }
+    }
     spread(std::move(front));
     number();
 }
@@ -32,17 +34,22 @@ OpenParts::OpenParts(const SurfaceImage& image, const std::int32_t* regions) : i
 // To open pixels of no part, a pixel at a time.
 void OpenParts::spread(Pixels front) {
     Pixels next;
+    Checkpoints checkpoints;
     for (; !front.empty(); front.swap(next), next.clear())
-        for (const int p : front)
+        for (const int p : front) {
+            checkpoints.pass();
             for (const int step : image_.neighbours())
                 if (image_.open(p + step) && !part_[p + step]) part_[p + step] = part_[p], next.push_back(p + step);
+        }
 }
 
 // Connected pixels of one number get a number of their own, in raster order.
 void OpenParts::number() {
-    const Array<int> before = part_;
-    std::fill(part_.begin(), part_.end(), 0);
+    Array<int> before;
+    before.swap(part_);
+    part_.assign(before.size(), 0);
     pixels_.assign(1, {});
+    Checkpoints checkpoints;
     for (int row = 0; row < image_.rows(); ++row) {
         Watch::checkpoint();
         for (int first = image_.index(row, 0), end = first + image_.cols(), start = first; start < end; ++start) {
@@ -51,12 +58,14 @@ void OpenParts::number() {
             Pixels& pixels = pixels_.back();
             const int number = static_cast<int>(pixels_.size()) - 1;
             part_[start] = number;
-            for (std::size_t i = 0; i < pixels.size(); ++i)
+            for (std::size_t i = 0; i < pixels.size(); ++i) {
+                checkpoints.pass();
                 for (const int step : image_.neighbours()) {
                     const int q = pixels[i] + step;
                     if (before[q] != before[start] || part_[q]) continue;
                     part_[q] = number, pixels.push_back(q);
                 }
+            }
         }
     }
     count_ = static_cast<int>(pixels_.size()) - 1;
@@ -77,15 +86,22 @@ void OpenParts::absorb_slivers(int min_area) {
         changed = false;
         number();
         Array<int> to(count_ + 1, 0);
+        Checkpoints checkpoints;
+        const auto is_thin = [&](int p) {
+            checkpoints.pass();
+            return thin(p);
+        };
         std::vector<std::map<int, int>> contacts(static_cast<std::size_t>(count_) + 1);
         for (int i = 1; i <= count_; ++i) {
             const Pixels& own = pixels_[static_cast<std::size_t>(i)];
             const bool small = static_cast<int>(own.size()) < min_area;
-            if (!small && !std::all_of(own.begin(), own.end(), [&](int p) { return thin(p); })) continue;
-            for (const int p : own)
+            if (!small && !std::all_of(own.begin(), own.end(), is_thin)) continue;
+            for (const int p : own) {
+                checkpoints.pass();
                 for (const int step : image_.neighbours())
                     if (part_[p + step] && part_[p + step] != i)
                         ++contacts[static_cast<std::size_t>(i)][part_[p + step]];
+            }
             int most = 0;
             for (const auto& [other, count] : contacts[static_cast<std::size_t>(i)]) {
                 // Of two slivers the smaller falls to the other.
@@ -104,7 +120,9 @@ void OpenParts::absorb_slivers(int min_area) {
 }
 
 void OpenParts::trim_spurs() {
+    Checkpoints checkpoints;
     const auto around = [&](int p, auto&& visit) {
+        checkpoints.pass();
         for (int row = -line_width; row <= line_width; ++row)
             for (int col = -line_width; col <= line_width; ++col) {
                 const int q = p + row * image_.stride() + col;

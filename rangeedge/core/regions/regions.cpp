@@ -69,7 +69,8 @@ Components components_of(PatchMap& patches) {
 
 void remove_small(PatchMap& patches, int min_area) {
     const Components parts = components_of(patches);
-    for (int i = 0; i < parts.count(); ++i)
+    Checkpoints checkpoints;
+    for (int i = 0; i < parts.count(); ++i, checkpoints.pass())
         if (parts.area(i) < min_area)
             for (const auto [begin, end] : parts.runs(i))
                 for (int p = begin; p < end; ++p) patches.release(p);

@@ -131,7 +131,7 @@ private:
     bool projective_, regular_;
     double lateral_, offset_, unit_ = 1, correlation_ = 1, correlation_area_ = 1;
     std::array<double, 6> to_plane_;
-    std::vector<Pixel, LargeAllocator<Pixel>> pixel_;
+    LargeVector<Pixel> pixel_;
     Array<std::uint8_t> state_;
 };
 
