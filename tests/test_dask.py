@@ -125,6 +125,7 @@ def slow(recording):
     return [type(frame)(frame.name, frame.path, frame.part, load) for frame, load in frames]
 
 
+@pytest.mark.skipif(os.name == "nt", reason="there is no such signal")
 def test_a_killed_worker_costs_nothing(client, recording, undisturbed, tmp_path):
     items = runBatch(slow(recording), tmp_path / "out", form="npz", client=client, **OPTIONS)
     assert next(items).state == "written"

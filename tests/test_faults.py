@@ -2,11 +2,14 @@
 
 import functools
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
 import sys
 import time
+import types
+from multiprocessing.context import ForkServerContext
 from pathlib import Path
 
 import numpy as np
@@ -62,6 +65,9 @@ def assert_complete(out, undisturbed):
     assert not [path for path in out.rglob("*.tmp")]
 
 
+posix = pytest.mark.skipif(os.name == "nt", reason="of POSIX: groups of processes, signals, devices")
+
+
 def killing(path, index, marker):
     """A frame; the first to come here is killed on the way."""
     if marker is None or not os.path.exists(marker):
@@ -71,6 +77,7 @@ def killing(path, index, marker):
     return framesOf(path)[index].read()
 
 
+@posix
 def test_a_killed_worker_costs_nothing(recording, undisturbed, tmp_path):
     frames = framesOf(recording)
     load = functools.partial(killing, str(recording), 7, str(tmp_path / "marker"))
@@ -81,6 +88,7 @@ def test_a_killed_worker_costs_nothing(recording, undisturbed, tmp_path):
     assert_complete(tmp_path / "out", undisturbed)
 
 
+@posix
 def test_a_frame_that_kills_every_worker_fails_alone(recording, undisturbed, tmp_path):
     frames = framesOf(recording)
     load = functools.partial(killing, str(recording), 7, None)
@@ -110,6 +118,7 @@ def await_lines(out, count, process):
         time.sleep(0.002)
 
 
+@posix
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_a_killed_run_is_completed(recording, undisturbed, tmp_path, jobs, capsys):
     out = tmp_path / "out"
@@ -143,6 +152,7 @@ def group_lives(group):
     return False
 
 
+@posix
 def test_an_interrupt_says_what_is_done(recording, tmp_path):
     out = tmp_path / "out"
     argv = command(recording, out, "--jobs", "2", "--form", "folder")
@@ -182,6 +192,54 @@ def test_two_runs_on_one_output(recording, tmp_path, capsys):
     assert main(command(recording, out)) == 0
 
 
+class LocksOfWindows:
+    """What `msvcrt` has of them: a byte that belongs to one descriptor."""
+
+    LK_NBLCK = 2
+
+    def __init__(self, monkeypatch):
+        self.owner = None
+        monkeypatch.setattr(os, "close", functools.partial(self.close, os.close))
+
+    def locking(self, descriptor, mode, count):
+        assert (os.fstat(descriptor).st_size, mode, count) == (0, self.LK_NBLCK, 1)
+        if self.owner is not None:
+            raise PermissionError(13, "Permission denied")
+        self.owner = descriptor
+
+    def close(self, close, descriptor):
+        if descriptor == self.owner:
+            self.owner = None
+        close(descriptor)
+
+
+def test_two_runs_on_one_output_on_windows(recording, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "msvcrt", LocksOfWindows(monkeypatch))
+    monkeypatch.setitem(sys.modules, "fcntl", None)
+    monkeypatch.setattr("rangeedge.recording.manifest.sys", types.SimpleNamespace(platform="win32"))
+    test_two_runs_on_one_output(recording, tmp_path, capsys)
+
+
+def test_lines_end_on_windows_as_elsewhere(tmp_path, monkeypatch):
+    """Windows would write two characters for the end of a line, but for a flag."""
+    opened, binary = os.open, 1 << 40
+    flags = []
+    monkeypatch.setattr(os, "O_BINARY", binary, raising=False)
+    monkeypatch.setattr(os, "open", lambda path, how, *mode: flags.append(how) or opened(path, how & ~binary, *mode))
+    with Manifest(tmp_path / "manifest.jsonl").opened() as ledger:
+        ledger.keep(set())
+        flags.clear()
+        ledger.append({"frame": "a"})
+    assert [flag & binary for flag in flags] == [binary]
+
+
+def test_workers_where_there_is_no_server_of_them(recording, undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(multiprocessing, "get_all_start_methods", lambda: ["spawn"])
+    monkeypatch.setattr(ForkServerContext, "set_forkserver_preload", lambda *_: pytest.fail("no such server"))
+    assert {item.state for item in runBatch(recording, tmp_path / "out", form="npz", jobs=2, **OPTIONS)} == {"written"}
+    assert_complete(tmp_path / "out", undisturbed)
+
+
 def test_resume_wants_something_to_resume(recording, tmp_path, capsys):
     assert main(command(recording, tmp_path / "other", "--resume")) == 2
     assert "to resume from" in capsys.readouterr().err
@@ -190,7 +248,8 @@ def test_resume_wants_something_to_resume(recording, tmp_path, capsys):
 
 def test_output_that_cannot_be_written(recording, tmp_path, capsys):
     (tmp_path / "file").write_text("no folder")
-    for out in (tmp_path / "file", tmp_path / "file" / "out", Path("/proc/out")):
+    nowhere = [Path("/proc/out")] if sys.platform == "linux" else []
+    for out in (tmp_path / "file", tmp_path / "file" / "out", *nowhere):
         assert main(command(recording, out)) == 2
         assert "cannot write to" in capsys.readouterr().err
 

@@ -130,7 +130,7 @@ MAIN_TIFF = [
     Input("TIFF float RGB", tiff(np.abs(np.nan_to_num(POINTS)), photometric="rgb"), "holds colours"),
     Input("TIFF x, y, z called RGB by tifffile", tiff(POINTS, photometric="rgb"), POINTS),
     Input("TIFF x, y, z called RGB by others", tiff(POINTS, photometric="rgb", software="HAL"), "holds colours"),
-    Input("TIFF x, y, z by cv2.imwrite", encoded(".tiff", POINTS), "pass them as an array"),
+    Input("TIFF x, y, z by cv2.imwrite", encoded(".tiff", POINTS), "pass them as an array|compressed by method 34676"),
     Input(
         "TIFF ZSTD, x, y, z in planes",
         tiff(np.moveaxis(POINTS, 2, 0), planarconfig="separate", compression="zstd"),

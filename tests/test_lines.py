@@ -222,6 +222,18 @@ def test_lines_are_plain_objects(chains, fitted, outlines):
     assert len(toLines(outlines)) == len(outlines.rings)
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
+def test_drawings_with_entities_are_refused(tmp_path, encoding):
+    """Nine of them, each ten of the one before, would be a billion."""
+    entities = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10 if i else "x"}">' for i in range(9))
+    path = tmp_path / "a.svg"
+    path.write_bytes(
+        f'<?xml version="1.0" encoding="{encoding}"?><!DOCTYPE svg [{entities}]><svg>&e8;</svg>'.encode(encoding)
+    )
+    with pytest.raises(rangeedge.error, match="entities" if encoding == "utf-8" else "garbled|decode|text"):
+        readLines(path)
+
+
 @pytest.mark.parametrize("command", ["lines", "segment"])
 @pytest.mark.parametrize("suffix", ["geojson", "svg", "obj"])
 def test_the_command_writes_one_file_by_its_suffix(command, suffix, depth, tmp_path):

@@ -8,7 +8,6 @@ import json
 import os
 import tempfile
 from typing import Any
-from xml.etree import ElementTree
 from xml.sax.saxutils import quoteattr
 
 import cv2
@@ -17,6 +16,7 @@ import numpy as np
 from .._check import error, fail
 from ..cancellation import apart
 from .polylines import REGION, Line, grouped, no_pixels
+from .settings import xml_root
 
 _APP = "RANGEEDGE"  # whose extended data DXF entities carry
 _DXF_COLOURS = {"jump": 30, "convex": 2, "concave": 140, REGION: 7}  # of AutoCAD
@@ -103,7 +103,7 @@ def _path(line: Line) -> str:
 
 def read_svg(data: bytes) -> list[Line]:
     lines = []
-    for path in ElementTree.fromstring(data).iter(f"{_SVG}path"):
+    for path in xml_root(data.decode()).iter(f"{_SVG}path"):
         known = json.loads(path.get("data-properties", "[]"))
         for i, part in enumerate(path.get("d", "").split("M ")[1:]):
             closed = part.rstrip().endswith("Z")

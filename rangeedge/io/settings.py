@@ -23,7 +23,7 @@ def parse(text: str) -> Any:
     """Nested dicts and lists of strings, numbers, booleans and None."""
     start = text.lstrip("\ufeff \t\r\n")
     if start.startswith("<"):
-        return _from_xml(start)
+        return _of_element(xml_root(start))
     if start.startswith(("{", "[")):
         try:
             return json.loads(_STORED.sub(lambda found: _OF_JSON[found[0]], start), object_pairs_hook=_map_of)
@@ -41,14 +41,14 @@ def _map_of(entries: Iterable[tuple[str, Any]]) -> dict[str, Any]:
     return found
 
 
-def _from_xml(text: str) -> Any:
+def xml_root(text: str) -> ElementTree.Element:
+    """The outermost element. Entities, which could multiply without end, are refused."""
     if "<!ENTITY" in text or "<!DOCTYPE" in text:
         raise ValueError("it is XML with entities")
     try:
-        root = ElementTree.fromstring(text)
+        return ElementTree.fromstring(text)
     except ElementTree.ParseError as reason:
         raise ValueError(f"its XML is garbled: {reason}") from None
-    return _of_element(root)
 
 
 def _of_element(element: ElementTree.Element, depth: int = 0) -> Any:

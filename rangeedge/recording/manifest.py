@@ -11,6 +11,7 @@ import errno
 import json
 import math
 import os
+import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -54,16 +55,14 @@ class Manifest:
     @contextlib.contextmanager
     def opened(self) -> Iterator[Manifest]:
         """Locks the manifest and reads it; the lock ends with the process, however that ends."""
-        import fcntl
-
         with writing(self.path, "cannot write to"):
             self.path.parent.mkdir(parents=True, exist_ok=True)
             lock = os.open(self.path.with_name(f".{self.path.name}.lock"), os.O_RDWR | os.O_CREAT, 0o666)
         try:
             with writing(self.path, "cannot lock"):
                 try:
-                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                except BlockingIOError:
+                    _lock(lock)
+                except (BlockingIOError, PermissionError):
                     raise error(
                         f"another run is writing to {str(self.path.parent)!r}; wait for it, or give another `out`"
                     ) from None
@@ -81,7 +80,7 @@ class Manifest:
     def append(self, line: Line) -> None:
         """Add a line, in one piece or not at all."""
         with writing(self.path, "cannot write to"):
-            descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND)
+            descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND | getattr(os, "O_BINARY", 0))
             try:
                 before = os.fstat(descriptor).st_size
                 data = _encoded(line)
@@ -93,6 +92,18 @@ class Manifest:
                     raise
             finally:
                 os.close(descriptor)
+
+
+def _lock(descriptor: int) -> None:
+    """Takes a file for this process, until it closes it or ends; a file that another has taken is refused."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _encoded(line: Mapping[str, Any]) -> bytes:

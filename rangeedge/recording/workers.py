@@ -29,6 +29,7 @@ from .._check import error
 _PATIENCE = 0.05  # seconds between questions whether the wait is given up
 _GRACE = 0.1  # seconds in which a worker may tidy up
 _AHEAD = 3  # tasks a worker that are in flight: one at work, one waiting, one whose result waits for those before
+_MOST_ON_WINDOWS = 61  # processes that can be waited for together
 _UNGUARDED = 73  # exit code of a worker that was about to run the whole program again
 _FULL = {errno.ENOSPC, errno.EDQUOT, errno.EROFS}
 
@@ -139,11 +140,18 @@ def _alone(call: Callable[[Any], Any], task: Any, future: Future[Outcome]) -> Ou
 
 
 class _Pool(ProcessPoolExecutor):
-    """Workers that are made by a server: a copy of a process with threads, as OpenCV starts them, may hang."""
+    """Workers that are made by a server: a copy of a process with threads, as OpenCV starts them, may hang.
+
+    Windows has no such server: there each begins anew.
+    """
 
     def __init__(self, jobs: int) -> None:
-        context = multiprocessing.get_context("forkserver")
-        context.set_forkserver_preload([__name__, "rangeedge.app.results"])
+        served = "forkserver" in multiprocessing.get_all_start_methods()
+        context = multiprocessing.get_context("forkserver" if served else "spawn")
+        if served:
+            context.set_forkserver_preload([__name__, "rangeedge.app.results"])
+        else:
+            jobs = min(jobs, _MOST_ON_WINDOWS)
         threads = max(1, (os.cpu_count() or 1) // jobs)
         super().__init__(jobs, context, _begin, (threads,))
         self._workers = self._processes

@@ -102,7 +102,7 @@ private:
         }
         groups.clear();
         for (const int i : kept_) {
-            const std::size_t slot = at(from.slot(i));
+            const int slot = from.slot(i);
             for (int group = blocks.begin[slot]; group < blocks.end[slot]; ++group) groups.push_back(group);
         }
     }
@@ -148,11 +148,11 @@ private:
         y_.assign(filled, far_away);
         marks_.resize(filled);
         for (std::size_t k = 0; k < kept_.size(); ++k) {
-            const std::size_t i = at(kept_[k]), slot = at(sources_.slot(kept_[k]));
+            const std::size_t i = at(kept_[k]);
             weight_[k] = sources_.weight[i];
             x_[k] = sources_.x[i];
             y_[k] = sources_.y[i];
-            contenders_[k] = tree_.sources.exact[slot];
+            contenders_[k] = tree_.sources.exact[sources_.slot(kept_[k])];
         }
     }
 

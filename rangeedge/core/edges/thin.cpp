@@ -157,7 +157,7 @@ private:
     template <class F>
     void narrow(const std::vector<int>& pixels, F&& from_here) {
         std::size_t least = by_depth_.size(), waiting = 0;
-        const auto may_go = [&](int p) { return is_set(p) & kind(p).may_go(); };
+        const auto may_go = [&](int p) { return int{is_set(p)} & int{kind(p).may_go()}; };
         const auto offer = [&](int p) {
             if (!may_go(p)) return;
             const std::size_t d = depth(p);
