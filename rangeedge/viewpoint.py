@@ -152,8 +152,11 @@ class _Lines(NamedTuple):
         return _Lines([r - place for r in self.rows], [c - place for c in self.columns], self.grid - place)
 
     def off_planes(self) -> float:
-        """How far lines lie off planes through the viewpoint; infinite where the rays cross each other."""
-        return np.inf if _folds(unit_rays(self.grid)) else self._off(_off_planes)
+        """How far lines lie off planes through the viewpoint; infinite where the lines of sight cross each other."""
+        rays = unit_rays(self.grid)
+        ahead = rays @ np.nanmean(rays.reshape(-1, 3), axis=0) if np.isfinite(rays).any() else 1.0
+        folded = _folds(rays * np.where(ahead < 0, -1.0, 1.0)[..., np.newaxis])  # also of points behind
+        return np.inf if folded else self._off(_off_planes)
 
     def off_cones(self) -> float:
         """How far lines lie off cones around the viewpoint; infinite where rays cross each other, or lie too close."""

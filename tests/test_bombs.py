@@ -123,7 +123,11 @@ def test_zarr_of_more_than_there_is(tmp_path):
     zarr.create_array(str(tmp_path / "many.zarr"), shape=(10**11, 480, 640), chunks=(1, 480, 640), dtype="u2")
     zarr.create_array(str(tmp_path / "large.zarr"), shape=(1, 200_000, 200_000), chunks=(1, 1000, 1000), dtype="u2")
     zarr.create_array(str(tmp_path / "chunks.zarr"), shape=(2, 480, 640), chunks=(1, 200_000, 200_000), dtype="u2")
-    for name, what in (("many", "frames, more than"), ("large", "pixels are more"), ("chunks", "pixels are more")):
+    for name, what in (
+        ("many", "frames, more than"),
+        ("large", "pixels are more"),
+        ("chunks", "more than .* that are unpacked"),
+    ):
         with pytest.raises(rangeedge.error, match=what):
             framesOf(tmp_path / f"{name}.zarr")[0].read()
 

@@ -39,17 +39,19 @@ struct Pixels {
     static RANGEEDGE_INLINE Vector ring(const StateMap& map, std::ptrdiff_t p, std::uint8_t flag) {
         const std::ptrdiff_t s = map.stride, around[]{1, 1 - s, -s, -1 - s, -1, s - 1, s, s + 1};
         Vector ring{};
-        for (int k = 0; k < 8; ++k)
-            ring |= has(load(map.states + p + around[k]), flag) & static_cast<std::uint8_t>(1 << k);
+        for (int k = 0; k < 8; ++k) {
+            const auto bit = static_cast<std::uint8_t>(1 << k);
+            ring |= has(load(map.states + p + around[k]), flag) & bit;
+        }
         return ring;
     }
 };
 
 template <int bytes>
-RANGEEDGE_INLINE Border border_marked_in(const StateMap& map, int round, std::uint8_t* layer) {
+RANGEEDGE_INLINE BorderCount border_marked_in(const StateMap& map, int round, std::uint8_t* layer) {
     using P = Pixels<bytes>;
     using V = typename P::Vector;
-    Border count{0, 0};
+    BorderCount count{0, 0};
     for (std::ptrdiff_t p = map.first; p < map.last; p += bytes) {
         const V states = P::load(map.states + p), open = P::has(states, StateMap::on) & ~P::has(states, StateMap::line);
         if (!P::any(open)) continue;
@@ -85,13 +87,16 @@ RANGEEDGE_INLINE void rings_listed_in(const StateMap& map, std::uint8_t* rings) 
     }
 }
 
-RANGEEDGE_VERSIONS(Border, border_marked, (const StateMap& map, int round, std::uint8_t* layer), (map, round, layer))
+RANGEEDGE_VERSIONS(BorderCount, border_marked, (const StateMap& map, int round, std::uint8_t* layer),
+                   (map, round, layer))
 RANGEEDGE_VERSIONS(void, kept_marked, (const StateMap& map), (map))
 RANGEEDGE_VERSIONS(void, rings_listed, (const StateMap& map, std::uint8_t* rings), (map, rings))
 
 }  // namespace
 
-Border mark_border(const StateMap& map, int round, std::uint8_t* layer) { return border_marked(map, round, layer); }
+BorderCount mark_border(const StateMap& map, int round, std::uint8_t* layer) {
+    return border_marked(map, round, layer);
+}
 void mark_kept(const StateMap& map) { kept_marked(map); }
 void list_rings(const StateMap& map, std::uint8_t* rings) { rings_listed(map, rings); }
 

@@ -16,12 +16,12 @@ struct StateMap {
     std::ptrdiff_t first, last, stride;
 };
 
-// Of the pixels that are on and in no line yet, those at the border, where a 4-neighbour is not on, become candidates if
-// they may go, else lines; `layer` becomes that of the round there.
-struct Border {
+// Of the pixels that are on and in no line yet, those at the border, where a 4-neighbour is not on, become candidates
+// if they may go, else lines; `layer` becomes that of the round there.
+struct BorderCount {
     std::size_t pixels, enclosed;  // pixels that are on and in no line, at the border and within
 };
-Border mark_border(const StateMap& map, int round, std::uint8_t* layer);
+BorderCount mark_border(const StateMap& map, int round, std::uint8_t* layer);
 // Candidates that must stay become kept.
 void mark_kept(const StateMap& map);
 // The rings of all pixels; `rings` holds zeros before.

@@ -42,7 +42,7 @@ public:
 
     void peel() {
         layers_ = 1;
-        const Border first = mark_border(map(), layers_, layer_.data());
+        const BorderCount first = mark_border(map(), layers_, layer_.data());
         mark_kept(map());
         std::vector<int> border = list_marked(first.pixels), next;
         std::size_t enclosed = first.enclosed;  // pixels that have not been border yet
