@@ -78,7 +78,7 @@ MUTANTS = [
         ("hole.size() <= most", "hole.size() < most"),
         ("std::max({before, after, 0.0}) + slack;", "std::max({before, after, 0.0}) + 1e3 * slack;")),
     *of("scan lines", "core/image/hole.hpp", "edges oracle noise",
-        ("static_cast<T>(whole - i) * left + static_cast<T>(i) * right", "static_cast<T>(i) * left + static_cast<T>(whole - i) * right")),
+        ("static_cast<T>(whole - i) * left + static_cast<T>(i) *", "static_cast<T>(i) * left + static_cast<T>(i) *")),
     *of("scan lines", "core/noise/steps.cpp", "edges noise",
         ("hole.size() <= most_bridged) interpolate", "hole.size() < 0) interpolate")),
     *of("merging", "core/scanline/merge.cpp", "edges oracle significance",
