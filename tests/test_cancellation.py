@@ -428,7 +428,7 @@ def test_an_interrupted_batch_ends_and_leaves_nothing(tmp_path, jobs):
     command = [sys.executable, "-m", "rangeedge", "batch", str(tmp_path), "--out", str(tmp_path / "out")]
     command += ["--pixel-size", "1", "--noise", "1e-4", "--jobs", str(jobs)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment) as run:
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT, env=environment) as run:
         manifest = tmp_path / "out" / "manifest.jsonl"
         while not manifest.exists() and run.poll() is None:
             time.sleep(0.05)

@@ -37,6 +37,7 @@ def command(*arguments, first=":", redirection="", **more):
     run = subprocess.run(
         ["sh", "-c", line, sys.executable, *map(os.fspath, arguments)],
         capture_output=True,
+        cwd=ROOT,
         env=environment,
         timeout=120,
     )
