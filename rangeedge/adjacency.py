@@ -258,7 +258,7 @@ def _describe(frame: Frame, pairs: np.ndarray, borders: Borders, surfaces: np.nd
     pairs["kind"][meet] = np.where(convex, EDGE_CONVEX, EDGE_CONCAVE)[meet]
     pairs["dihedral"][meet] = np.where(convex, 180 - angle, 180 + angle)[meet]
     near = (borders.means(points[borders.pixels[0]]) + borders.means(points[borders.pixels[1]])) / 2
-    first, second = surfaces[borders.first], surfaces[borders.second]
+    first, second = (by_bands(lambda own: surfaces[own], each) for each in (borders.first, borders.second))
     point, direction = _intersections(first, second, near)
     crossing = meet & ~np.isnan(direction[:, 0])
     pairs["point"][crossing], pairs["direction"][crossing] = point[crossing], direction[crossing]
@@ -274,5 +274,9 @@ def _intersections(first: np.ndarray, second: np.ndarray, near: np.ndarray) -> t
     direction = np.where(meets[:, None], direction / np.where(meets, sine, 1.0)[:, None], np.nan)
     normals = np.stack([first["normal"], second["normal"], direction], axis=1)
     on = np.stack([first["centroid"], second["centroid"], near], axis=1)
-    point[meets] = np.linalg.solve(normals[meets], (normals * on).sum(axis=2)[meets][..., None])[..., 0]
+    point[meets] = by_bands(
+        lambda own, places: np.linalg.solve(own, (own * places).sum(axis=2)[..., None])[..., 0],
+        normals[meets],
+        on[meets],
+    )
     return point, direction

@@ -173,8 +173,13 @@ def _planes(moments: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Mean points, normals of the planes through them, and root mean square distances from these."""
     mean = moments[:, [_PLACE[e] for e in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]]
     second = [[_PLACE[tuple(a + b)] for b in np.eye(3, dtype=int)] for a in np.eye(3, dtype=int)]
-    values, vectors = np.linalg.eigh(moments[:, second] - mean[:, :, None] * mean[:, None, :])
-    return mean, vectors[:, :, 0], np.sqrt(np.maximum(values[:, 0], 0.0))
+
+    def thinnest(moments: np.ndarray, mean: np.ndarray) -> np.ndarray:
+        values, vectors = np.linalg.eigh(moments[:, second] - mean[:, :, None] * mean[:, None, :])
+        return np.column_stack([vectors[:, :, 0], values[:, 0]])
+
+    least = by_bands(thinnest, moments, mean)
+    return mean, least[:, :3], np.sqrt(np.maximum(least[:, 3], 0.0))
 
 
 def _curved(frame: Frame, labels: np.ndarray, count: int) -> np.ndarray:

@@ -222,6 +222,12 @@ def test_lines_are_plain_objects(chains, fitted, outlines):
     assert len(toLines(outlines)) == len(outlines.rings)
 
 
+@pytest.mark.parametrize("lines", [memoryview(np.zeros((2, 3))), np.zeros((2, 3)), "chains", [1], 5, None])
+def test_what_holds_no_lines_is_refused(lines):
+    with pytest.raises(rangeedge.error, match="`lines` must be EdgeChains, Segments, arcs"):
+        toLines(lines)
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16"])
 def test_drawings_with_entities_are_refused(tmp_path, encoding):
     """Nine of them, each ten of the one before, would be a billion."""

@@ -91,9 +91,10 @@ def toLines(lines: Any) -> list[Line]:
         return list(_of_segments(lines))
     if isinstance(lines, np.ndarray) and lines.dtype == ARC:
         return list(_of_arcs(lines))
-    if isinstance(lines, Sequence) and all(isinstance(line, EdgeChain) for line in lines):
+    listed = isinstance(lines, Sequence) and not isinstance(lines, memoryview)
+    if listed and all(isinstance(line, EdgeChain) for line in lines):
         return list(_of_chains(lines))
-    if isinstance(lines, Sequence) and all(isinstance(line, Line) for line in lines):
+    if listed and all(isinstance(line, Line) for line in lines):
         return [_checked(line) for line in lines]
     raise fail(
         "lines", "EdgeChains, Segments, arcs, RegionBoundaries, or a sequence of EdgeChain or Line", described(lines)
