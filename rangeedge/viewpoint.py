@@ -19,6 +19,7 @@ _LINES = 16  # rows and columns, each, that are looked at
 _OFF_PLANE = 0.01  # of its length, by which a scan line may lie off its plane or cone on average
 _SHARP = 0.5  # pixels, by which a plane image may be off its points
 _EXACT = 1e-3  # pixels, below which images are the same
+_LEAST_OFF = 1e-4  # of its length, by which a scan line may lie off anyway
 _PREFERRED = 3.0  # times the offsets of another viewpoint that those of (0, 0, 0) may have
 _LEAST_IMAGE = 8  # rows and columns that tell more than where rays are planes
 _GRID = 32  # rows and columns of points that tell whether rays cross each other
@@ -55,14 +56,15 @@ def view_of(points: np.ndarray, origin: Point | None) -> View:
         return _view_from(points, origin, lines.seen_from(origin))
     if min(points.shape[:2]) >= _LEAST_IMAGE and (view := _plane_image(points)):
         return view
-    flat, parallel = lines.off_planes(), lines.off_parallel()
-    if min(flat, parallel) <= _OFF_PLANE or min(points.shape[:2]) < _LEAST_IMAGE:
+    flat, parallel, turning = lines.off_planes(), lines.off_parallel(), lines.off_cones()
+    if min(flat, parallel) <= _LEAST_OFF or min(points.shape[:2]) < _LEAST_IMAGE:
         return View(False) if parallel < flat else _plane_view(points, None)
     moved, moved_off = _best(lines, _Lines.off_planes, [_common_point(lines.rows + lines.columns)])
     turned, turned_off = _best(lines, _Lines.off_cones, _apexes(lines))
-    turning = lines.off_cones()
-    if turning <= _OFF_PLANE and turning <= _PREFERRED * min(moved_off, turned_off):
-        return _turning_view(points, None)
+    if min(flat, parallel, turning) <= min(_OFF_PLANE, max(_PREFERRED * min(moved_off, turned_off), _LEAST_OFF)):
+        if min(flat, parallel) > _OFF_PLANE:
+            return _turning_view(points, None)
+        return View(False) if parallel < flat else _plane_view(points, None)
     if moved_off <= min(_OFF_PLANE, turned_off):
         return _plane_view(points, moved)
     if turned_off <= _OFF_PLANE:

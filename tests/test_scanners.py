@@ -193,17 +193,20 @@ def test_scans_in_another_frame(rows, elevation, azimuth, place):
     assert near(right, edges) > 0.98
 
 
-@pytest.mark.parametrize("place", [(0, 0, 0), (4, 0, 0), (0.3, 0.2, 0.1), (400000, 5e6, 120)])
-def test_a_narrow_scan_is_not_seen_in_parallel(place):
-    rays, ranges, _ = sweep(128, 10, (10, -10))  # columns and walls are upright
-    ranges[40:90, 150:330] *= 0.6  # a card before the wall
-    right = detectEdges(rays * ranges[..., None]) > 0
-    points = rays * ranges[..., None] + np.array(place)
-    frame = read_frame(points, ScanLineParams())
+@pytest.mark.parametrize("place", [(0, 0, 0), (0, 0, 1), (4, 0, 0), (0.3, 0.2, 0.1), (400000, 5e6, 120)])
+@pytest.mark.parametrize(("rows", "up", "around"), [(128, 10, 10), (128, 8, 12), (64, 12, 15), (64, 14, 20)])
+def test_narrow_scans_in_another_place(rows, up, around, place):
+    rays, ranges, _ = sweep(rows, up, (around, -around))  # columns and walls are upright, as if seen in parallel
+    ranges[rows // 3 : 2 * rows // 3, 150:330] *= 0.6  # a card before the wall
+    points = rays * (ranges + 0.005 * np.random.default_rng(3).standard_normal(ranges.shape))[..., None]
+    right = detectEdges(points) > 0
+    frame = read_frame(points + np.array(place), ScanLineParams())
     assert frame.projective
     np.testing.assert_allclose(frame.origin, place, atol=0.05)
+    edges = detectEdges(points + np.array(place)) > 0
     assert right.any()
-    assert near(detectEdges(points) > 0, right) > 0.98
+    assert near(edges, right) > 0.98
+    assert near(right, edges) > 0.98
 
 
 @pytest.mark.parametrize("place", [(0, 0, 0), (0.05, 0.02, 0), (-4, -0.3, -0.2), (56, -31, 18), (-900, 1200, -2000)])
