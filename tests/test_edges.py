@@ -190,6 +190,20 @@ def test_small_holes_make_no_edges_of_noise(waves, share):
     assert not detectEdges(z, K=(300, 300, 159.5, 119.5)).any()
 
 
+@pytest.mark.parametrize("unknown", [NAN, 0, 1e-9])
+def test_the_noise_across_small_holes_is_that_beside_them(unknown):
+    rng = np.random.default_rng(7)
+    z = 1.5 + 0.003 * rng.normal(size=(120, 160))
+    holes = rng.random(z.shape) < 0.1
+    z[holes] = NAN
+    sigma = np.full(z.shape, 0.003, np.float32)
+    expected = edgePoints(z, noise=sigma, minSignificance=0)
+    sigma[holes] = unknown
+    found = edgePoints(z, noise=sigma, minSignificance=0)
+    assert len(expected) > 0
+    np.testing.assert_array_equal(found, expected)
+
+
 def test_eps_is_the_tolerance_of_splitting():
     z = np.where(np.arange(40) < 20, 1.25, 1.0) * np.ones((30, 1))
     options = dict(noise=0.001, mergeSignificance=0.0, minSignificance=0.0)

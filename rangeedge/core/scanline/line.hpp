@@ -104,6 +104,12 @@ struct Line {
     // The noise of sample k, of the border between two samples, and of a segment.
     SampleNoise noise_at(int k) const {
         const std::int64_t p = pixel(k);
+        if (frame->noise.map && !has_data(k)) {  // nor has the map there
+            int left = k, right = k;
+            while (!has_data(left)) --left;
+            while (!has_data(right)) ++right;
+            return noise_between(left, right);
+        }
         if (curved) {
             const double by = stretch(abscissa(k)), q = ordinate(k) / by;
             return {by * frame->noise.sigma(q, p, true), by * frame->noise.waves_at(q, p, true)};

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <functional>
 #include <limits>
 
 #include "base/simd.hpp"
@@ -123,22 +122,16 @@ void LineReader<T>::take_rows(Strip<T>& strip) const {
 template <class T>
 void LineReader<T>::bridge(Strip<T>& strip) const {
     const int most = std::min(most_bridged, options_.max_gap);
+    const auto pitch = static_cast<std::size_t>(frame_.cols + padding);
     Array<Hole> holes;
     for (std::size_t j = 0; j < strip.lines.size(); ++j) {
         Line<T>& line = strip.lines[j];
         find_bridged(line, most, holes);
         line.bridged = !holes.empty();
         if (!line.bridged) continue;
-        const auto within = [&](const std::vector<T>& of, const T* values) {
-            return !of.empty() && std::less_equal<>()(of.data(), values) &&
-                   std::less<>()(values, of.data() + of.size());
-        };
-        T* y = strip.y.data() + j * static_cast<std::size_t>(frame_.cols + padding);
-        if (within(strip.y, line.y))
-            y = strip.y.data() + (line.y - strip.y.data());
-        else
-            std::copy_n(line.y, line.path.size, y);
-        line.y = y;
+        const T* in_image = frame_.ordinate ? frame_.ordinate + line.pixel(0) : nullptr;
+        if (line.y == in_image) line.y = std::copy_n(line.y, frame_.cols, strip.y.data() + j * pitch) - frame_.cols;
+        T* y = strip.y.data() + (line.y - strip.y.data());
         for (const Hole& hole : holes) {
             interpolate(hole, y);
             if (line.x) interpolate(hole, strip.x.data() + (line.x - strip.x.data()));
