@@ -197,9 +197,9 @@ def test_the_noise_across_small_holes_is_that_beside_them(unknown):
     holes = rng.random(z.shape) < 0.1
     z[holes] = NAN
     sigma = np.full(z.shape, 0.003, np.float32)
-    expected = edgePoints(z, noise=sigma, minSignificance=0)
+    expected = edgePoints(z, pixelSize=0.01, noise=sigma, minSignificance=0)
     sigma[holes] = unknown
-    found = edgePoints(z, noise=sigma, minSignificance=0)
+    found = edgePoints(z, pixelSize=0.01, noise=sigma, minSignificance=0)
     assert len(expected) > 0
     np.testing.assert_array_equal(found, expected)
 
