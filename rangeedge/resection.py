@@ -40,13 +40,12 @@ def resect(points: np.ndarray) -> Resection:
     here, _ = _projected(seen / lengths, pixels)
     parallel = _affine(np.hstack([(seen - middle)[:, :2] / scale, ones]), pixels)
     moved, matrix = _projected(np.hstack([(seen - middle) / scale, ones]), pixels)
-    if matrix is None:
-        return Resection(here, parallel, np.inf, None)
-    centre = np.linalg.svd(matrix)[2][-1]
-    place = centre[:3] / centre[3] * scale + middle
-    return (
-        Resection(here, parallel, moved, place) if np.isfinite(place).all() else Resection(here, parallel, np.inf, None)
-    )
+    if matrix is not None:
+        centre = np.linalg.svd(matrix)[2][-1]
+        place = centre[:3] / centre[3] * scale + middle
+        if np.isfinite(place).all():  # not where rays are parallel
+            return Resection(here, parallel, moved, place)
+    return Resection(here, parallel, np.inf, None)
 
 
 def _projected(vectors: np.ndarray, pixels: np.ndarray) -> tuple[float, np.ndarray | None]:
@@ -68,7 +67,7 @@ def _projected(vectors: np.ndarray, pixels: np.ndarray) -> tuple[float, np.ndarr
     if not ((images[:, 2] > 0).all() or (images[:, 2] < 0).all()):
         return np.inf, None
     off = images[:, :2] / images[:, 2:] - places
-    return extent * _rms(off), matrix if misfits[-1] <= _FIXED * misfits[-2] else None
+    return float(extent) * _rms(off), matrix if misfits[-1] <= _FIXED * misfits[-2] else None
 
 
 def _affine(vectors: np.ndarray, pixels: np.ndarray) -> float:

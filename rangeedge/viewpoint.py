@@ -237,12 +237,8 @@ def _common_point(lines: list[np.ndarray]) -> np.ndarray | None:
 
 def _apexes(lines: _Lines) -> list[np.ndarray]:
     """Where cones of a scanner that turns may begin: on the axis in which the planes of its columns, or rows, meet."""
-    return [
-        apex
-        for straight, round_ in ((lines.columns, lines.rows), (lines.rows, lines.columns))
-        if len(straight) > 2 and round_
-        for apex in [_apex_on(*_axis_of(straight), round_)]
-    ]
+    ways = ((lines.columns, lines.rows), (lines.rows, lines.columns))
+    return [_apex_on(*_axis_of(flat), around) for flat, around in ways if len(flat) > 2 and around]
 
 
 def _axis_of(lines: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
