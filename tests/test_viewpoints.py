@@ -9,6 +9,7 @@ import rangeedge
 from rangeedge import detectEdges, edgeStrength, segmentRegions
 from rangeedge.frame import read_frame
 from rangeedge.options import ScanLineParams
+from rangeedge.resection import resect
 from rangeedge.viewpoint import View, distorted_rays, mean_ray, view_of
 
 
@@ -73,6 +74,22 @@ def test_images_of_few_planes_in_another_frame(scene, place):
     if right.any():
         assert near(edges, right) > 0.98
         assert near(right, edges) > 0.98
+
+
+def test_points_and_their_pixels_tell_the_viewpoint():
+    points = rays_of() * depth_of(rays_of(), 0)[..., None]
+    own = resect(points)
+    assert own.here < 1e-9
+    assert own.parallel > 5
+    moved = resect(points @ turned((30, 100, -20)).T + (4, -7, 1.1))
+    assert moved.moved < 1e-9
+    assert moved.here > 5
+    np.testing.assert_allclose(moved.place, (4, -7, 1.1), atol=1e-9)
+    v, u = np.indices(SHAPE)
+    grid = resect(np.dstack([0.02 * u - 3, 0.03 * v + 1, np.sin(u / 9) * np.cos(v / 7)]))
+    assert grid.parallel < 1e-9
+    assert grid.here > 5
+    assert resect(np.full((9, 9, 3), np.nan)) == (np.inf, np.inf, np.inf, None)
 
 
 def test_rows_of_a_scan_that_are_shifted_are_refused():
